@@ -1,0 +1,46 @@
+"""What the simulated robot and the clock say: did it fall, and what a step cost."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from naoimitate.core.geometry import matrix_from_quat
+from naoimitate.run.file import Run
+from naoimitate.run.measure import Bar, Measure
+
+MAX_TILT = np.radians(45.0)
+"""Largest angle of the torso's up-axis from its planned direction, rad (design section 7)."""
+MIN_HEIGHT = 0.6
+"""Smallest height of the torso as a fraction of the planned one (design section 7)."""
+MS = 1000.0
+
+
+def fell(run: Run) -> bool | None:
+    """Whether the simulated robot fell; None without simulation.
+
+    The simulation's own word (which knows the load on the feet) or the recorded torso: either is enough.
+    """
+    if run.sim_fell is None:
+        return None
+    return bool(run.sim_fell) or _toppled(run)
+
+
+def _toppled(run: Run) -> bool:
+    if run.sim_base_pos is None or run.sim_base_quat is None:
+        return False
+    low = run.sim_base_pos[:, 2] < MIN_HEIGHT * run.base_pos[:, 2]
+    up = [np.array([matrix_from_quat(quat)[:, 2] for quat in quats]) for quats in (run.base_quat, run.sim_base_quat)]
+    tilted = np.sum(up[0] * up[1], axis=1) < np.cos(MAX_TILT)
+    return bool(np.any(low | tilted))
+
+
+def survival(run: Run) -> list[Measure]:
+    """The measures of survival and of time."""
+    step = MS * run.step_time
+    note = "" if run.sim_fell is not None else "no simulation in this run; use imitate --sim"
+    return [
+        Measure("fell", "fell in simulation", fell(run), "", Bar(0), note=note),
+        Measure("step_time_mean_ms", "step time, mean", float(step.mean()), "ms"),
+        Measure("step_time_p99_ms", "step time, 99th percentile", float(np.percentile(step, 99)), "ms"),
+        Measure("step_time_max_ms", "step time, largest", float(step.max()), "ms"),
+    ]
