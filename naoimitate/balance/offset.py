@@ -1,0 +1,71 @@
+"""The rate-limited offset: where the CoM's projection lies between the feet (Koenemann 2014, section V-A)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+GRAVITY = 9.81
+"""m/s^2."""
+
+
+@dataclass(frozen=True)
+class OffsetLaw:
+    """How fast the CoM may be shifted from foot to foot."""
+
+    min_speed: float = 0.05
+    """[1/s] at the borders 0 and 1: the paper's pure parabola never leaves them."""
+    max_speed: float = 1.0
+    """[1/s] in the middle, 0.5."""
+    max_zmp_shift: float = 0.010
+    """[m] by which the acceleration of the offset may move the zero moment point."""
+    min_feet_distance: float = 0.03
+    """[m] below which (6) is ill-conditioned and the last value is kept."""
+
+    def speed(self, offset: float) -> float:
+        """v(o) = v_min + (v_max - v_min) 4 o (1 - o), 1/s: the paper's negative quadratic with its maximum at 0.5."""
+        o = min(max(offset, 0.0), 1.0)
+        return self.min_speed + (self.max_speed - self.min_speed) * 4.0 * o * (1.0 - o)
+
+    def acceleration(self, feet_distance: float, com_height: float) -> float:
+        """Largest acceleration of the offset, 1/s^2: a = g dZMP / (z d), from the linear inverted pendulum."""
+        return GRAVITY * self.max_zmp_shift / (max(com_height, 1e-3) * max(feet_distance, self.min_feet_distance))
+
+
+def normalised_offset(com: Array, left: Array, right: Array, last: float, min_distance: float = 0.03) -> float:
+    """Equation (6): o = (p_CoM - p_L) . (p_R - p_L) / |p_R - p_L|^2 with horizontal positions (2,) m.
+
+    The last value is kept while the feet are closer than ``min_distance``. Not clamped.
+    """
+    dx, dy = right[0] - left[0], right[1] - left[1]
+    squared = dx * dx + dy * dy
+    if not squared >= min_distance * min_distance:
+        return last
+    return float(((com[0] - left[0]) * dx + (com[1] - left[1]) * dy) / squared)
+
+
+def advance(offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, acceleration: float) -> tuple[float, float]:
+    """One step of the offset towards its target: the speed law, and an acceleration bound, braking included.
+
+    offset, target: normalised; velocity: 1/s; dt: s; acceleration: 1/s^2. Returns the new offset and velocity.
+    The offset never passes its target and never leaves [0, 1].
+    """
+    distance = target - offset
+    limit = min(law.speed(offset), _braking_speed(abs(distance), acceleration, dt), abs(distance) / dt)
+    wanted = math.copysign(limit, distance)
+    change = acceleration * dt
+    velocity = min(max(wanted, velocity - change), velocity + change)
+    moved = offset + velocity * dt
+    if (moved - target) * (offset - target) < 0.0 or abs(moved - target) < 1e-9:
+        return target, wanted if abs(distance) > 1e-9 else 0.0
+    return min(max(moved, 0.0), 1.0), velocity
+
+
+def _braking_speed(distance: float, acceleration: float, dt: float) -> float:
+    """The speed from which a discrete bang of -acceleration stops within the distance."""
+    half = 0.5 * acceleration * dt
+    return math.sqrt(half * half + 2.0 * acceleration * distance) - half

@@ -1,0 +1,134 @@
+"""The swing foot's way: straight up off the floor, free, over its landing place, straight down (design: section 4.6)."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.core.geometry import matrix_from_rotation_vector, rotation_vector, yaw_matrix
+
+Array = npt.NDArray[np.float64]
+
+
+class Phase(enum.Enum):
+    """Parts of a swing."""
+
+    LIFT = "lift"
+    FREE = "free"
+    APPROACH = "approach"
+    DESCEND = "descend"
+
+
+@dataclass(frozen=True)
+class SwingSettings:
+    """Shape and pace of a step."""
+
+    clearance: float = 0.015
+    """[m] of the sole's lowest point above the floor while it swings, at least."""
+    lift_height: float = 0.010
+    """[m] of straight lift before the foot may move sideways or tilt."""
+    lift_speed: float = 0.12
+    """[m/s] straight up."""
+    approach_speed: float = 0.3
+    """[m/s] over the floor to the landing place."""
+    descend_speed: float = 0.10
+    """[m/s] straight down, at most."""
+    touch_speed: float = 0.02
+    """[m/s] at the floor."""
+    acceleration: float = 2.0
+    """[m/s^2] of every part."""
+    turn_speed: float = 2.5
+    """[rad/s]."""
+    arrived: float = 0.0005
+    """[m] and [rad * 0.1 m]: the foot is over its landing place."""
+
+
+class Swing:
+    """One swing, from lift-off to touchdown: gives the sole pose to ask for in each frame.
+
+    position (3,) m and rotation (3, 3): the planted sole at lift-off.
+    """
+
+    def __init__(self, position: Array, rotation: Array, settings: SwingSettings) -> None:
+        self.phase = Phase.LIFT
+        self.settings = settings
+        self.min_height = 0.0
+        self._velocity = np.zeros(3)
+        self._start = position.copy()
+        self._rotation = rotation.copy()
+
+    @property
+    def fixed_pose(self) -> bool:
+        """Whether the sole follows a pose exactly (everywhere but in free swing)."""
+        return self.phase is not Phase.FREE
+
+    def step(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float) -> tuple[Array, Array, bool]:
+        """The sole pose to ask for next.
+
+        position, rotation: the sole as it is. goal (2,) m, goal_yaw rad: where it is to land, used once ``landing``.
+        Returns position (3,), rotation (3, 3), and whether it has touched down.
+        """
+        if self.phase is Phase.LIFT:
+            return self._lift(position, dt)
+        if not landing:
+            self.phase = Phase.FREE
+            self.min_height = min(self.settings.clearance, self.min_height + self.settings.lift_speed * dt)
+            self._velocity[:] = 0.0
+            return position, yaw_matrix(goal_yaw), False
+        if self.phase is Phase.DESCEND:
+            return self._descend(position, dt)
+        return self._approach(position, rotation, goal, goal_yaw, dt)
+
+    def stop(self) -> None:
+        """The last step was not taken: start again from rest."""
+        self._velocity[:] = 0.0
+
+    def _lift(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
+        speed = min(self._velocity[2] + self.settings.acceleration * dt, self.settings.lift_speed)
+        self._velocity[:] = (0.0, 0.0, speed)
+        height = position[2] + speed * dt
+        if height >= self.settings.lift_height:
+            self.phase, self.min_height = Phase.FREE, self.settings.lift_height * 0.9
+        return np.array([self._start[0], self._start[1], height]), self._rotation, False
+
+    def _approach(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, dt: float) -> tuple[Array, Array, bool]:
+        self.phase = Phase.APPROACH
+        target = np.array([goal[0], goal[1], self.settings.clearance])
+        level = yaw_matrix(goal_yaw)
+        turn = rotation_vector(level @ rotation.T)
+        way, angle = target - position, float(np.linalg.norm(turn))
+        if np.linalg.norm(way) < self.settings.arrived and 0.1 * angle < self.settings.arrived:
+            self.phase = Phase.DESCEND
+            self._start, self._rotation = target, level
+            self._velocity[:] = 0.0
+            return self._descend(target, dt)
+        step = self._braked(way, dt)
+        part = min(1.0, self.settings.turn_speed * dt / angle) if angle > 0.0 else 1.0
+        return position + step, matrix_from_rotation_vector(part * turn) @ rotation, False
+
+    def _braked(self, way: Array, dt: float) -> Array:
+        distance = float(np.linalg.norm(way))
+        if distance == 0.0:
+            return way
+        half = 0.5 * self.settings.acceleration * dt
+        speed = min(math.sqrt(half * half + 2.0 * self.settings.acceleration * distance) - half, self.settings.approach_speed)
+        change = speed * way / distance - self._velocity
+        length = float(np.linalg.norm(change))
+        if length > self.settings.acceleration * dt:
+            change *= self.settings.acceleration * dt / length
+        self._velocity += change
+        step = self._velocity * dt
+        return way if np.linalg.norm(step - way) < 1e-5 else step
+
+    def _descend(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
+        s = self.settings
+        braking = math.sqrt(s.touch_speed**2 + 2.0 * s.acceleration * max(position[2], 0.0))
+        speed = min(-self._velocity[2] + s.acceleration * dt, s.descend_speed, braking)
+        self._velocity[:] = (0.0, 0.0, -speed)
+        height = position[2] - speed * dt
+        down = height < 1e-5
+        return np.array([self._start[0], self._start[1], 0.0 if down else height]), self._rotation, down

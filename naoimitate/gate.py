@@ -1,0 +1,113 @@
+"""The last check of a pose before it leaves: limits, planted feet, balance, collisions. A pure function."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from naoimitate.balance.legs import Legs, table_bounds
+from naoimitate.core.geometry import convex_hull, polygon_margin
+from naoimitate.robot.model import RobotModel
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GateLimits:
+    """What a pose must keep to be sent."""
+
+    margin: float = 0.020
+    """[m] of the CoM's ground projection inside the stance outlines (or no less than the pose before)."""
+    slip: float = 1e-4
+    """[m] of any outline point of a stance sole from where it was planted."""
+    speed_share: float = 0.89
+    """Share of the motors' no-load speed."""
+    overlap: float = 5e-4
+    """[m] by which two shapes of the body, or the body and the floor, may touch (or no more than before)."""
+
+
+class GateModel(NamedTuple):
+    """Flat arrays of a robot's limits. tables as in ``Legs``, over all joints."""
+
+    lower: Array
+    upper: Array
+    speed: Array
+    table_x: npt.NDArray[np.int64]
+    table_y: npt.NDArray[np.int64]
+    table_rows: Array
+
+
+def build_gate(robot: RobotModel) -> GateModel:
+    """Flatten a robot's limits."""
+    rows = max((len(t.rows) for t in robot.tables), default=1)
+    padded = [np.concatenate([t.rows, np.repeat(t.rows[-1:], rows - len(t.rows), axis=0)]) for t in robot.tables]
+    return GateModel(
+        robot.lower,
+        robot.upper,
+        robot.speed,
+        np.array([t.x for t in robot.tables], dtype=np.int64),
+        np.array([t.y for t in robot.tables], dtype=np.int64),
+        np.array(padded).reshape(len(padded), rows, 3),
+    )
+
+
+@njit(cache=True)
+def range_excess(model: GateModel, q: Array) -> float:
+    """Largest angle beyond a joint's range or a coupling table, rad (negative inside); inf for NaN."""
+    worst = -np.inf
+    for j in range(q.shape[0]):
+        if not np.isfinite(q[j]):
+            return np.inf
+        worst = max(worst, model.lower[j] - q[j], q[j] - model.upper[j])
+    for t in range(model.table_x.shape[0]):
+        low, _, high, _ = table_bounds(model.table_rows[t], q[model.table_x[t]])
+        y = q[model.table_y[t]]
+        worst = max(worst, low - y, y - high)
+    return worst
+
+
+@njit(cache=True)
+def speed_ratio(model: GateModel, q: Array, before: Array, dt: float) -> float:
+    """Largest joint speed over the motor's no-load speed between two poses dt s apart."""
+    worst = 0.0
+    for j in range(q.shape[0]):
+        worst = max(worst, abs(q[j] - before[j]) / (dt * model.speed[j]))
+    return worst
+
+
+@njit(cache=True)
+def support_margin(legs: Legs, sole_pos: Array, sole_rot: Array, left: bool, right: bool, com: Array) -> float:
+    """Signed distance of the CoM's ground projection to the edge of the stance outlines' convex hull, m."""
+    count = legs.outline.shape[1]
+    points = np.empty((count * (int(left) + int(right)), 2))
+    row = 0
+    for side in range(2):
+        if (side == 0 and left) or (side == 1 and right):
+            for k in range(count):
+                for a in range(2):
+                    points[row, a] = (
+                        sole_pos[side, a]
+                        + sole_rot[side, a, 0] * legs.outline[side, k, 0]
+                        + sole_rot[side, a, 1] * legs.outline[side, k, 1]
+                    )
+                row += 1
+    return polygon_margin(convex_hull(points), com[0], com[1])
+
+
+@njit(cache=True)
+def outline_travel(legs: Legs, side: int, pos_a: Array, rot_a: Array, pos_b: Array, rot_b: Array) -> float:
+    """Largest distance between an outline point of a sole in two poses, m."""
+    worst = 0.0
+    for k in range(legs.outline.shape[1]):
+        squared = 0.0
+        for a in range(3):
+            d = pos_a[a] - pos_b[a]
+            for b in range(2):
+                d += (rot_a[a, b] - rot_b[a, b]) * legs.outline[side, k, b]
+            squared += d * d
+        worst = max(worst, np.sqrt(squared))
+    return worst

@@ -1,0 +1,163 @@
+"""The compact human model: torso frame, feet, and the posture of equation (1) (Koenemann 2014, section III)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from naoimitate.core.errors import CalibrationError
+from naoimitate.core.frames import LANDMARK, SEGMENT, HumanFrame
+from naoimitate.core.geometry import matrix_from_quat
+
+Array = npt.NDArray[np.float64]
+
+EFFECTORS = ("l_hand", "l_foot", "r_hand", "r_foot")
+"""Order of the rows of a posture: equation (1)."""
+ANKLE_HEIGHT_BY_STATURE = 0.039
+"""Ankle above the sole / stature (Drillis and Contini 1966, in Winter 2009, Fig. 4.1)."""
+LEG_BY_STATURE = 0.491
+"""(Hip-knee + knee-ankle) / stature: (0.530 - 0.039) (Drillis and Contini 1966)."""
+
+_L_HIP, _R_HIP = LANDMARK["l_hip"], LANDMARK["r_hip"]
+_SHOULDERS = (LANDMARK["l_shoulder"], LANDMARK["r_shoulder"])
+_ELBOWS = (LANDMARK["l_elbow"], LANDMARK["r_elbow"])
+_WRISTS = (LANDMARK["l_wrist"], LANDMARK["r_wrist"])
+_HIPS = (_L_HIP, _R_HIP)
+_KNEES = (LANDMARK["l_knee"], LANDMARK["r_knee"])
+_ANKLES = (LANDMARK["l_ankle"], LANDMARK["r_ankle"])
+_TOES = (LANDMARK["l_toe"], LANDMARK["r_toe"])
+_FEET = (SEGMENT["l_foot"], SEGMENT["r_foot"])
+_NEEDED = tuple(r for pair in (_SHOULDERS, _ELBOWS, _WRISTS, _HIPS, _KNEES, _ANKLES, _TOES) for r in pair)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A person's measures, from the T-pose.
+
+    arm: (2,) m, shoulder-elbow plus elbow-wrist; leg: (2,) m, hip-knee plus knee-ankle plus ankle-sole; left, right.
+    ankle_height: m, ankle joint above the sole. toe_pitch: (2,) rad, slope of the ankle-toe line below the sole's plane.
+    stature: m.
+    """
+
+    arm: tuple[float, float]
+    leg: tuple[float, float]
+    ankle_height: float
+    toe_pitch: tuple[float, float]
+    stature: float
+
+    @property
+    def limb_lengths(self) -> Array:
+        """(4,) m in the order of ``EFFECTORS``."""
+        return np.array([self.arm[0], self.leg[0], self.arm[1], self.leg[1]])
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """What imitation needs of one moment of a person.
+
+    posture: (4, 3) m, equation (1) in the torso frame. torso: (3, 3) world from torso. mid_hip: (3,) m.
+    soles: (2, 3) m, the points of the sole planes below the ankles. feet: (2, 3, 3) world from foot.
+    foot_centres: (2, 3) m, ankle-toe midpoints. elbows: (2, 3) unit, shoulder to elbow in the torso frame.
+    """
+
+    posture: Array
+    torso: Array
+    mid_hip: Array
+    soles: Array
+    feet: Array
+    foot_centres: Array
+    elbows: Array
+
+
+def measure(tpose: HumanFrame) -> Body:
+    """Measure a person who stands in a T-pose, feet flat.
+
+    Raises CalibrationError where a landmark is missing or a limb has no length.
+    """
+    missing = [name for name, row in LANDMARK.items() if row in _NEEDED and not np.isfinite(tpose.landmarks[row]).all()]
+    if missing:
+        raise CalibrationError(f"the T-pose lacks {', '.join(missing)}: choose another moment with --tpose-at")
+
+    def length(*rows: int) -> float:
+        return float(sum(np.linalg.norm(tpose.landmarks[b] - tpose.landmarks[a]) for a, b in zip(rows, rows[1:], strict=False)))
+
+    arms = [length(_SHOULDERS[i], _ELBOWS[i], _WRISTS[i]) for i in (0, 1)]
+    legs = [length(_HIPS[i], _KNEES[i], _ANKLES[i]) for i in (0, 1)]
+    if min(arms + legs) < 0.05 or length(_L_HIP, _R_HIP) < 0.01:
+        raise CalibrationError("a limb of the T-pose is shorter than 5 cm: check the unit of length (--unit)")
+    stature = sum(legs) / 2.0 / LEG_BY_STATURE
+    ankle = ANKLE_HEIGHT_BY_STATURE * stature
+    pitch = [_slope(tpose.landmarks[_TOES[i]] - tpose.landmarks[_ANKLES[i]]) for i in (0, 1)]
+    return Body((arms[0], arms[1]), (legs[0] + ankle, legs[1] + ankle), ankle, (pitch[0], pitch[1]), stature)
+
+
+def _slope(v: Array) -> float:
+    return math.atan2(-float(v[2]), math.hypot(float(v[0]), float(v[1])))
+
+
+def observe(body: Body, frame: HumanFrame) -> BodyState:
+    """Equation (1) and its frames for one moment; every needed landmark must be finite.
+
+    f = [p_LHand^LShoulder, p_LFoot^LHip, p_RHand^RShoulder, p_RFoot^RHip]. Hand: the wrist. Foot: the point of the sole
+    plane below the ankle joint, which turns with the foot. Feet without an orientation get one from ankle, toe and knee.
+    """
+    state = BodyState(
+        np.empty((4, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3))
+    )
+    p = np.ascontiguousarray(frame.landmarks, dtype=np.float64)
+    for side in (0, 1):
+        given = None if frame.orientations is None else frame.orientations[_FEET[side]]
+        if given is not None and np.isfinite(given).all():
+            state.feet[side] = matrix_from_quat(np.ascontiguousarray(given))
+        else:
+            _foot_frame(p[_ANKLES[side]], p[_TOES[side]], p[_KNEES[side]], body.toe_pitch[side], state.feet[side])
+    _observe(p, body.ankle_height, state.posture, state.torso, state.mid_hip, state.soles, state.feet, state.foot_centres, state.elbows)
+    return state
+
+
+@njit(cache=True)
+def torso_frame(p: Array, out: Array) -> None:
+    """Rotation (3, 3) world from torso: z from mid-hip to mid-shoulder, y the mean of the hip and shoulder lines."""
+    up = p[_SHOULDERS[0]] + p[_SHOULDERS[1]] - p[_L_HIP] - p[_R_HIP]
+    shoulders = p[_SHOULDERS[0]] - p[_SHOULDERS[1]]
+    hips = p[_L_HIP] - p[_R_HIP]
+    across = shoulders / max(np.linalg.norm(shoulders), 1e-9) + hips / max(np.linalg.norm(hips), 1e-9)
+    z = up / max(np.linalg.norm(up), 1e-9)
+    x = np.cross(across, z)
+    x /= max(np.linalg.norm(x), 1e-9)
+    out[:, 0] = x
+    out[:, 1] = np.cross(z, x)
+    out[:, 2] = z
+
+
+@njit(cache=True)
+def _foot_frame(ankle: Array, toe: Array, knee: Array, toe_pitch: float, out: Array) -> None:
+    """Foot axes from the ankle-toe line, turned up by its slope in the T-pose, and the shank for the roll."""
+    along = (toe - ankle) / max(np.linalg.norm(toe - ankle), 1e-9)
+    across = np.cross(knee - ankle, along)
+    across /= max(np.linalg.norm(across), 1e-9)
+    above = np.cross(along, across)
+    c, s = math.cos(toe_pitch), math.sin(toe_pitch)
+    out[:, 0] = c * along + s * above
+    out[:, 1] = across
+    out[:, 2] = c * above - s * along
+
+
+@njit(cache=True)
+def _observe(
+    p: Array, ankle_height: float, posture: Array, torso: Array, mid_hip: Array, soles: Array, feet: Array, centres: Array, elbows: Array
+) -> None:
+    torso_frame(p, torso)
+    mid_hip[:] = 0.5 * (p[_L_HIP] + p[_R_HIP])
+    to_torso = np.ascontiguousarray(torso.T)
+    for side in range(2):
+        soles[side] = p[_ANKLES[side]] - ankle_height * feet[side, :, 2]
+        centres[side] = 0.5 * (p[_ANKLES[side]] + p[_TOES[side]])
+        posture[2 * side] = to_torso @ (p[_WRISTS[side]] - p[_SHOULDERS[side]])
+        posture[2 * side + 1] = to_torso @ (soles[side] - p[_HIPS[side]])
+        upper = to_torso @ (p[_ELBOWS[side]] - p[_SHOULDERS[side]])
+        elbows[side] = upper / max(np.linalg.norm(upper), 1e-9)

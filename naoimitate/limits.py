@@ -1,0 +1,96 @@
+"""Speed and acceleration limits of tasks, per wall-clock frame (Koenemann 2014, section V-D)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TaskLimits:
+    """How fast hands, feet and joints may be asked to move."""
+
+    hand_speed: float = 0.6
+    """[m/s] of a hand in the torso frame."""
+    hand_acceleration: float = 4.0
+    """[m/s^2]: two arms of a tenth of the mass each then move the ZMP by about 1 cm."""
+    foot_speed: float = 0.3
+    """[m/s] of a foot in the torso frame."""
+    foot_acceleration: float = 2.0
+    """[m/s^2]."""
+    head_speed: float = 2.0
+    """[rad/s]."""
+    joint_share: float = 0.85
+    """Share of the motors' no-load speed that a joint may use."""
+    max_dt: float = 0.05
+    """[s] of elapsed time that a single step may use up, however late it comes."""
+
+
+class Follower:
+    """Points that follow their targets with bounded speed and acceleration, and without lag where they can."""
+
+    def __init__(self, start: Array, speed: float, acceleration: float) -> None:
+        self.position = np.array(start, dtype=np.float64)
+        self.velocity = np.zeros_like(self.position)
+        self._target = self.position.copy()
+        self._speed = speed
+        self._acceleration = acceleration
+
+    def step(self, target: Array, dt: float) -> Array:
+        """Advance (K, 3) points towards targets (K, 3) m by dt s and return where they are now."""
+        follow(self.position, self.velocity, self._target, np.ascontiguousarray(target), dt, self._speed, self._acceleration)
+        return self.position
+
+    def restart(self, position: Array) -> None:
+        """Stand still at a position, after a held frame."""
+        self.position[:] = position
+        self.velocity[:] = 0.0
+
+
+@njit(cache=True)
+def follow(p: Array, v: Array, last: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> None:
+    """One step of points p, v (K, 3) towards ``target``, whose previous value is ``last``; all three are updated.
+
+    Where the step to the target respects both bounds it is taken whole. Elsewhere the velocity is turned, within the
+    acceleration, towards the target's own velocity plus the speed from which the rest of the way can be braked.
+    """
+    for k in range(p.shape[0]):
+        change, need, gap = 0.0, 0.0, 0.0
+        for a in range(3):
+            step = (target[k, a] - p[k, a]) / dt
+            need += step * step
+            change += (step - v[k, a]) ** 2
+            gap += (target[k, a] - p[k, a]) ** 2
+        if need <= max_speed**2 and change <= (max_acceleration * dt) ** 2:
+            for a in range(3):
+                v[k, a] = (target[k, a] - p[k, a]) / dt
+                p[k, a] = target[k, a]
+                last[k, a] = target[k, a]
+            continue
+        gap = math.sqrt(gap)
+        half = 0.5 * max_acceleration * dt
+        approach = math.sqrt(half * half + 2.0 * max_acceleration * gap) - half
+        wanted = np.empty(3)
+        for a in range(3):
+            wanted[a] = (target[k, a] - last[k, a]) / dt + (approach * (target[k, a] - p[k, a]) / gap if gap > 0.0 else 0.0)
+            last[k, a] = target[k, a]
+        _shorten(wanted, max_speed)
+        turn = wanted - v[k]
+        _shorten(turn, max_acceleration * dt)
+        for a in range(3):
+            v[k, a] += turn[a]
+            p[k, a] += v[k, a] * dt
+
+
+@njit(cache=True)
+def _shorten(v: Array, length: float) -> None:
+    norm = math.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    if norm > length:
+        for a in range(3):
+            v[a] *= length / norm
