@@ -36,8 +36,8 @@ class Parameters:
     com: (T, 2) m, where the centre of mass is over the floor.
     height: (T,) m of mid-hip above the floor.
     trunk: (T, 3) rad, yaw to the left, pitch forwards, roll to the right, of the chest.
-    arms: (T, 2, 4) rad, left and right: raised from hanging (pi overhead), in the plane at this angle from straight
-        ahead to the own side (pi/2 lateral), elbow flexed, elbow swivelled (outwards and up).
+    arms: (T, 2, 4) rad, left and right, of the line from shoulder to wrist against the chest: swung forwards from
+        hanging (pi overhead), then spread to the own side (pi/2 lateral); elbow bent; elbow swivelled up and out.
     head: (T, 2) rad, yaw to the left and pitch down, against the chest.
     """
 
@@ -81,7 +81,7 @@ def arm_towards(body: Anthropometry, side: str, wrist: Array) -> Array:
     if not -1.0 <= cosine <= 1.0:
         raise UnreachablePose(f"the {side} wrist cannot be {distance:.3f} m from its shoulder: choose a nearer point")
     x, y, z = np.asarray(wrist) / distance
-    return np.array([np.arccos(-z), np.arctan2(SIGN[side] * y, x), np.arccos(cosine), 0.0])
+    return np.array([np.arctan2(x, -z), np.arcsin(SIGN[side] * y), np.arccos(cosine), 0.0])
 
 
 def _turn(yaw_pitch_roll: Array) -> Rotation:
@@ -103,11 +103,11 @@ def _set_trunk(body: Anthropometry, landmarks: Array, pelvis: Rotation, chest: R
 
 def _set_arm(body: Anthropometry, landmarks: Array, side: str, chest: Rotation, arm: Array) -> Rotation:
     """Elbow, wrist and hand of one arm, (T, 4) rad as in ``Parameters``; returns the hand's orientation."""
-    raised, plane, flexion, swivel = arm.T
+    swing, spread, flexion, swivel = arm.T
     sign, upper, fore = SIGN[side], body.upper_arm, body.forearm
-    towards = np.column_stack([np.sin(raised) * np.cos(plane), sign * np.sin(raised) * np.sin(plane), -np.cos(raised)])
+    towards = np.column_stack([np.sin(swing) * np.cos(spread), sign * np.sin(spread), -np.cos(swing) * np.cos(spread)])
     pole = _perpendicular(np.array(ELBOW_POLE) * [1.0, sign, 1.0], towards)
-    pole = Rotation.from_rotvec(-sign * swivel[:, None] * towards).apply(pole)
+    pole = Rotation.from_rotvec(sign * swivel[:, None] * towards).apply(pole)
     distance = np.sqrt(upper**2 + fore**2 + 2.0 * upper * fore * np.cos(flexion))
     along = (distance**2 + upper**2 - fore**2) / (2.0 * distance)
     aside = upper * fore * np.sin(flexion) / distance
@@ -156,10 +156,9 @@ def _knee(body: Anthropometry, landmarks: Array, side: str, pole: Array) -> Arra
     distance = np.linalg.norm(leg, axis=-1, keepdims=True)
     bent = np.minimum(distance, body.thigh + body.shank)
     along = (bent**2 + body.thigh**2 - body.shank**2) / (2.0 * bent)
+    aside = np.sqrt(np.maximum(body.thigh**2 - along**2, 0.0))
     towards = leg / distance
-    return np.asarray(
-        hip + along * towards + np.sqrt(np.maximum(body.thigh**2 - along**2, 0.0)) * _perpendicular(pole, towards)
-    )
+    return np.asarray(hip + along * towards + aside * _perpendicular(pole, towards))
 
 
 def _perpendicular(pole: Array, axis: Array) -> Array:

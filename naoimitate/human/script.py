@@ -1,4 +1,4 @@
-"""Scripts for the procedural person: tracks of values over time, steps of the feet, and the motion they make."""
+"""A scripted motion: what every part of the procedural person does when, and the parameters that follow."""
 
 from __future__ import annotations
 
@@ -10,78 +10,30 @@ import numpy.typing as npt
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.human.anthropometry import Anthropometry
 from naoimitate.human.procedural import Parameters
-
-Move = tuple[float, float, npt.ArrayLike]
-"""From s, to s, the value to arrive at."""
-
-
-@dataclass(frozen=True)
-class Track:
-    """A value that rests, moves, and rests again: minimum-jerk blends, so twice continuously differentiable.
-
-    start: the value at the beginning, a number or a vector. moves: when it changes, in order of time, not overlapping.
-    """
-
-    start: npt.ArrayLike
-    moves: tuple[Move, ...] = ()
-
-    def __call__(self, time: Array) -> Array:
-        """The value at times (T,) s, (T,) or (T, n)."""
-        value = np.asarray(self.start, dtype=float)
-        result = np.broadcast_to(value, (len(time), *value.shape)).copy()
-        for begin, end, goal in self.moves:
-            change = np.asarray(goal, dtype=float) - value
-            result += np.multiply.outer(minimum_jerk((time - begin) / (end - begin)), change)
-            value = value + change
-        return result
-
-
-def minimum_jerk(s: Array) -> Array:
-    """Blend from 0 to 1 over s = 0..1 with velocity and acceleration zero at both ends (Flash and Hogan 1985)."""
-    s = np.clip(s, 0.0, 1.0)
-    return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
-
-
-Foot = tuple[float, float, float, float, float, float]
-"""A pose of a foot: x, y, z m of the sole below the ankle, yaw, pitch, roll rad."""
-
-
-@dataclass(frozen=True)
-class Swing:
-    """One foot in the air, from lift to landing, both s: straight up, through the poses of ``via``, straight down flat.
-
-    foot: ``l`` or ``r``. land_at: x, y m and yaw rad of the landing. height: m over the floor on the way up and down.
-    rise: s that the way up takes, and the way down. via: (from s, to s, pose) while in the air; without any, the foot
-    goes straight over to its landing.
-    """
-
-    foot: str
-    lift: float
-    land: float
-    land_at: tuple[float, float, float]
-    height: float
-    rise: float
-    via: tuple[tuple[float, float, Foot], ...] = ()
+from naoimitate.human.steps import Landing, Stride, Swing, planted
+from naoimitate.human.tracks import Curve, Track
 
 
 @dataclass(frozen=True)
 class Script:
-    """A motion in words: what every part does when.
+    """What a person does.
 
-    duration s, rate Hz. stance: x, y m and yaw rad of the left and right foot at the beginning. swings: in time order.
-    offset: centre of mass on the line from the left (0) to the right (1) foot's centre. height: m of mid-hip above the
-    floor. trunk, left_arm, right_arm, head: as in ``Parameters``.
+    duration s. stance: where the left and right foot stand at the beginning. offset: centre of mass on the line from
+    the left (0) to the right (1) foot's centre. height: m of mid-hip above the floor. trunk, left_arm, right_arm,
+    head: as in ``Parameters``. swings: in order of time. path: centre of mass over the floor, (T, 2) m, instead of the
+    offset. rate: frames a second.
     """
 
     duration: float
-    stance: tuple[tuple[float, float, float], tuple[float, float, float]]
-    offset: Track
-    height: Track
-    trunk: Track
-    left_arm: Track
-    right_arm: Track
-    swings: tuple[Swing, ...] = ()
-    head: Track = field(default=Track((0.0, 0.0)))
+    stance: tuple[Landing, Landing]
+    offset: Curve
+    height: Curve
+    trunk: Curve
+    left_arm: Curve
+    right_arm: Curve
+    head: Curve = field(default=Track((0.0, 0.0)))
+    swings: tuple[Swing | Stride, ...] = ()
+    path: Curve | None = None
     rate: float = 100.0
 
     @property
@@ -93,11 +45,12 @@ class Script:
 def parameters(script: Script, body: Anthropometry) -> Parameters:
     """The person's parameters at every frame of a script."""
     time = script.time
-    feet = np.stack([foot_track(script, side)(time) for side in SIDES], axis=1)
+    feet = np.stack([foot_poses(script, side) for side in SIDES], axis=1)
     left, right = foot_centers(feet, body)
+    on_line = left + script.offset(time)[:, None] * (right - left)
     return Parameters(
         feet=feet,
-        com=left + script.offset(time)[:, None] * (right - left),
+        com=on_line if script.path is None else script.path(time),
         height=script.height(time),
         trunk=script.trunk(time),
         arms=np.stack([script.left_arm(time), script.right_arm(time)], axis=1),
@@ -105,34 +58,20 @@ def parameters(script: Script, body: Anthropometry) -> Parameters:
     )
 
 
-def foot_track(script: Script, side: str) -> Track:
-    """Everything that one foot does, as a track of its six pose values."""
-    x, y, yaw = script.stance[SIDES.index(side)]
-    pose: Foot = (x, y, 0.0, yaw, 0.0, 0.0)
-    moves: list[Move] = []
+def foot_poses(script: Script, side: str) -> Array:
+    """(T, 6) pose of one foot at every frame: x, y, z m of the sole point below the ankle, yaw, pitch, roll rad."""
+    time = script.time
+    pose = planted(script.stance[SIDES.index(side)])
+    poses = np.tile(pose, (len(time), 1))
     for swing in script.swings:
         if swing.foot == side:
-            moves += _swing_moves(swing, pose)
-            pose = (*swing.land_at[:2], 0.0, swing.land_at[2], 0.0, 0.0)
-    return Track((x, y, 0.0, yaw, 0.0, 0.0), tuple(moves))
-
-
-def _swing_moves(swing: Swing, start: Foot) -> list[Move]:
-    up = swing.lift + swing.rise
-    down = swing.land - swing.rise
-    x, y, yaw = swing.land_at
-    over = (x, y, swing.height, yaw, 0.0, 0.0)
-    arrive = swing.via[-1][1] if swing.via else up
-    return [
-        (swing.lift, up, (*start[:2], swing.height, *start[3:])),
-        *swing.via,
-        (arrive, down, over),
-        (down, swing.land, (x, y, 0.0, yaw, 0.0, 0.0)),
-    ]
+            poses += swing.change(time, pose)
+            pose = planted(swing.land_at)
+    return poses
 
 
 def support(script: Script) -> npt.NDArray[np.str_]:
-    """(T,) ``D``, ``L`` or ``R``: the feet that stand at every frame; a foot is up strictly between lift and landing."""
+    """(T,) ``D``, ``L``, ``R`` or ``F``: feet that stand; a foot is up strictly between lift and landing."""
     time = script.time
     up = {side: np.zeros(len(time), dtype=bool) for side in SIDES}
     for swing in script.swings:

@@ -78,19 +78,18 @@ def center_of_mass(landmarks: Array) -> Array:
     A segment with a missing (NaN) landmark is left out and the others' masses are renormalised; NaN where no segment
     is known.
     """
-    complete = np.isfinite(landmarks).all(axis=-1)
-    com = np.einsum("l,...lk->...k", _BODY, landmarks)
-    if complete.all():
-        return com
-    gaps = ~complete.all(axis=-1)
-    com[gaps] = _center_of_known(landmarks[gaps], complete[gaps])
+    com = np.asarray(np.einsum("l,...lk->...k", _BODY, landmarks))
+    gaps = np.asarray(~np.isfinite(com).all(axis=-1))
+    if gaps.any():
+        com[gaps] = _center_of_known(landmarks[gaps])
     return com
 
 
-def _center_of_known(landmarks: Array, complete: np.ndarray) -> Array:
-    """Centre of mass of the segments whose landmarks are all there, (N, 19, 3) m, (N, 19) bool -> (N, 3) m."""
-    missing = (~complete).astype(float) @ (_WEIGHTS > 0.0).T.astype(float)
-    mass = np.where(missing > 0.0, 0.0, _MASSES)
+def _center_of_known(landmarks: Array) -> Array:
+    """Centre of mass of the segments whose landmarks are all there, (N, 19, 3) m -> (N, 3) m."""
+    complete = np.isfinite(landmarks).all(axis=-1)
+    lacking = np.einsum("nl,sl->ns", ~complete, _WEIGHTS)
+    mass = np.where(lacking > 0.0, 0.0, _MASSES)
     total = mass.sum(axis=-1, keepdims=True)
     share = np.divide(mass, total, out=np.full_like(mass, np.nan), where=total > 0.0)
     known = np.where(complete[..., None], landmarks, 0.0)
