@@ -1,0 +1,1 @@
+"""Drivers of robots, and what is theirs to do: servo gravity compensation."""

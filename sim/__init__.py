@@ -1,0 +1,1 @@
+"""The robot in MuJoCo: model, driver, simulation of a plan, pictures."""

@@ -1,0 +1,62 @@
+"""What every robot offers, simulated or real: connect, read its state, take a command, stop.
+
+A driver takes the newest command at its own period and never waits for one, so that a slow sender cannot freeze the
+robot mid-step. Times are seconds on the driver's own monotonic clock, starting with ``connect``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from naoimitate.core.frames import Array, RobotCommand
+
+FSR_NAMES = ("front_left", "front_right", "rear_left", "rear_right")
+"""Columns of ``RobotState.fsr``, seen from above with the toes up; rows are the left and the right foot."""
+
+
+@dataclass(frozen=True)
+class RobotState:
+    """What a robot measures at one moment.
+
+    time: s on the driver's clock.
+    q: (J,) rad, joint encoders in the model's joint order.
+    torque: (J,) N m that the servos give; the torque of a shared motor stands at its leading joint.
+    angles: (2,) rad, roll and pitch of the torso from the inertial board.
+    gyro: (3,) rad/s and accelerometer: (3,) m/s^2 in the torso frame; an upright robot at rest reads (0, 0, +9.81).
+    fsr: (2, 4) N, force sensors of the left and right foot, columns as ``FSR_NAMES``.
+    fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height.
+    base_pos: (3,) m and base_quat: (4,) torso in the world, where the driver knows them (simulation), else None.
+    """
+
+    time: float
+    q: Array
+    torque: Array
+    angles: Array
+    gyro: Array
+    accelerometer: Array
+    fsr: Array
+    fell: bool
+    base_pos: Array | None = None
+    base_quat: Array | None = None
+
+
+@runtime_checkable
+class Driver(Protocol):
+    """A robot that can be commanded. Adding one is one file and one entry in the table of drivers."""
+
+    @property
+    def period(self) -> float:
+        """Time between two uses of the newest command, s."""
+
+    def connect(self) -> None:
+        """Find the robot and switch its servos on where it stands; NaoimitateError says what to do if it cannot."""
+
+    def read(self) -> RobotState:
+        """Return the newest state; never blocks."""
+
+    def write(self, command: RobotCommand) -> None:
+        """Replace the command that the servos follow; never blocks."""
+
+    def stop(self) -> None:
+        """End the motion safely and let go of the robot; may be called twice."""

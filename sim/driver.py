@@ -1,0 +1,125 @@
+"""The simulated robot as a ``Driver``: in real time in a thread of its own, or as fast as the computer can."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import NamedTuple
+
+from naoimitate.core.frames import Array, RobotCommand
+from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.driver import RobotState
+from naoimitate.robot.model import RobotModel
+from naoimitate.sim.physics import Physics
+from naoimitate.sim.placement import stand_on_floor
+from naoimitate.sim.settings import SimSettings
+from naoimitate.sim.survival import has_tipped, roll_pitch, tilt
+
+DEFAULT = SimSettings()
+
+
+class _Target(NamedTuple):
+    """What the servos follow: the part of a RobotCommand that a body can carry out."""
+
+    q: Array
+    base_pos: Array
+    base_quat: Array
+    support: str
+
+
+class MujocoDriver:
+    """A robot in MuJoCo that stands in its posture ``stand`` until the first command.
+
+    real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
+    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        settings: SimSettings = DEFAULT,
+        *,
+        compensation: bool = True,
+        real_time: bool = True,
+    ) -> None:
+        self._robot, self._settings = robot, settings
+        self._physics = Physics(robot, settings)
+        self._compensation = GravityCompensation(robot) if compensation else None
+        self._real_time = real_time
+        stand = robot.postures["stand"]
+        self._target = _Target(stand, *stand_on_floor(robot, stand), "D")
+        self._halt = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._place()
+
+    @property
+    def period(self) -> float:
+        """Time between two uses of the newest command, s."""
+        return self._settings.period
+
+    def connect(self) -> None:
+        """Put the robot into its stand; with ``real_time`` its clock starts."""
+        self.stop()
+        self._place()
+        if self._real_time:
+            self._halt.clear()
+            self._thread = threading.Thread(target=self._run, name="mujoco", daemon=True)
+            self._thread.start()
+
+    def read(self) -> RobotState:
+        """Return the state after the last period."""
+        return self._state
+
+    def write(self, command: RobotCommand) -> None:
+        """Replace the command that the servos follow from the next period on."""
+        self._target = _Target(command.q, command.base_pos, command.base_quat, command.support)
+
+    def stop(self) -> None:
+        """Stop the clock; the robot stays as it is."""
+        self._halt.set()
+        if self._thread is not None:
+            self._thread.join()
+            self._thread = None
+
+    def advance(self, duration: float) -> RobotState:
+        """Let simulated time pass (s, whole periods) as fast as the computer can; only without ``real_time``."""
+        for _ in range(max(1, round(duration / self.period))):
+            self._tick()
+        return self._state
+
+    def _place(self) -> None:
+        target = self._target
+        self._physics.place(target.q, target.base_pos, target.base_quat)
+        self._state = self._measure(target)
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._halt.is_set():
+            self._tick()
+            due = max(due + self.period, time.monotonic())
+            self._halt.wait(max(0.0, due - time.monotonic()))
+
+    def _tick(self) -> None:
+        target = self._target
+        servos = target.q
+        if self._compensation is not None:
+            servos = self._compensation.command(target.q, target.base_quat, target.support, self._settings.stiffness)
+        self._physics.advance(servos, self.period)
+        self._state = self._measure(target)
+
+    def _measure(self, target: _Target) -> RobotState:
+        physics = self._physics
+        pos, quat = physics.base_pos, physics.base_quat
+        tipped = has_tipped(tilt(target.base_quat, quat), pos[2] / target.base_pos[2])
+        return RobotState(
+            time=physics.time,
+            q=physics.q,
+            torque=physics.torque,
+            angles=roll_pitch(quat),
+            gyro=physics.gyro,
+            accelerometer=physics.accelerometer,
+            fsr=physics.fsr,
+            fell=bool(tipped),
+            base_pos=pos,
+            base_quat=quat,
+        )

@@ -1,0 +1,119 @@
+"""The MuJoCo model of a robot, derived from the URDF text, soles, shapes and sensors of its ``RobotModel``.
+
+Names: bodies and joints as in the URDF, actuators as the joints that they move, ``base`` the free joint, ``floor``,
+geoms of body shapes as in ``RobotModel.shapes``, ``l_plate``, ``r_plate`` bodies in the sole frames, ``l_sole_0``...
+the contact points of a sole, sensors ``accelerometer``, ``gyro`` and ``l_fsr_front_left``... after
+``hw.driver.FSR_NAMES``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from naoimitate.core.errors import RobotModelError
+from naoimitate.core.frames import Array
+from naoimitate.robot.model import BASE, RobotModel
+from naoimitate.sim.contacts import add_shapes, add_soles
+from naoimitate.sim.scene import add_looks, add_scene
+from naoimitate.sim.sensors import add_cameras, add_force_sensors, add_imu
+from naoimitate.sim.settings import SimSettings
+
+DEFAULT = SimSettings()
+
+STOP_SOLREF = (0.005, 1.0)
+"""Time constant (s) and damping ratio of joint stops and of the coupling of joints that share a motor: gears, rigid
+next to the servos."""
+
+
+def build_model(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjModel:
+    """Compile the robot on its floor; see ``build_spec``."""
+    return build_spec(robot, settings).compile()
+
+
+def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjSpec:
+    """Return an editable model (for other scenes): free torso, servos, soles, body shapes, sensors, cameras, floor.
+
+    Raises RobotModelError when the URDF and the robot's data do not belong together.
+    """
+    spec = mujoco.MjSpec.from_string(robot.urdf)
+    bodies = _bodies(spec, robot)
+    spec.compiler.fusestatic = False
+    _remove_imported_geoms(spec)
+    bodies[BASE].add_freejoint(name="base")
+    _set_options(spec, settings)
+    _add_servos(spec, robot, settings)
+    _couple(spec, robot)
+    add_shapes(spec, bodies, robot, settings.friction)
+    add_soles(bodies, robot, settings.friction)
+    add_imu(spec, bodies, robot)
+    add_force_sensors(spec, robot)
+    add_cameras(spec, robot)
+    add_looks(spec, bodies, robot)
+    add_scene(spec, settings.friction)
+    return spec
+
+
+def torque_limits(robot: RobotModel, settings: SimSettings) -> Array:
+    """Limits (J,) N m of the servos' torque, after ``settings.torque_limit``."""
+    if settings.torque_limit == "effort":
+        return robot.effort
+    stall = robot.data.get("stall_torque")
+    if stall is None:
+        raise RobotModelError(f"{robot.name} states no stall_torque; simulate it with torque_limit='effort'")
+    return np.array([stall[name] for name in robot.joint_names])
+
+
+def _bodies(spec: mujoco.MjSpec, robot: RobotModel) -> dict[int, Any]:
+    """Bodies by the index of the joint that moves them; ``BASE`` the torso."""
+    bodies = {BASE: spec.worldbody.first_body()}
+    for index, name in enumerate(robot.joint_names):
+        joint = spec.joint(name)
+        if joint is None:
+            raise RobotModelError(f"The URDF of {robot.name} has no movable joint {name!r}")
+        bodies[index] = joint.parent
+    return bodies
+
+
+def _remove_imported_geoms(spec: mujoco.MjSpec) -> None:
+    """Shapes come from ``RobotModel`` (capsules, exclusions), couplings from ``RobotModel.coupled``."""
+    for element in [*spec.geoms, *spec.equalities]:
+        spec.delete(element)
+
+
+def _set_options(spec: mujoco.MjSpec, settings: SimSettings) -> None:
+    spec.option.timestep = settings.timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10.0  # friction ten times as hard as the normal direction: standing feet do not creep
+
+
+def _add_servos(spec: mujoco.MjSpec, robot: RobotModel, settings: SimSettings) -> None:
+    """One position servo a motor: torque = clip(k (command - q) - d dq, limits)."""
+    limits = torque_limits(robot, settings)
+    followers = {follower for _, follower in robot.coupled}
+    for index, name in enumerate(robot.joint_names):
+        joint = spec.joint(name)
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE  # the servo has the limit, the joint none of its own
+        joint.solref_limit = STOP_SOLREF
+        joint.armature = 0.0 if index in followers else settings.armature
+        if index in followers:
+            continue
+        servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        servo.set_to_position(kp=settings.stiffness, kv=settings.stiffness * settings.damping_time)
+        servo.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        servo.forcerange = [-limits[index], limits[index]]
+
+
+def _couple(spec: mujoco.MjSpec, robot: RobotModel) -> None:
+    """One motor, two joints: follower = leader."""
+    for leader, follower in robot.coupled:
+        names = robot.joint_names[follower], robot.joint_names[leader]
+        coupling = spec.add_equality(
+            name=f"{names[0]}_as_{names[1]}", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
+        )
+        coupling.name1, coupling.name2 = names
+        coupling.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
+        coupling.solref = STOP_SOLREF

@@ -1,0 +1,117 @@
+"""The simulated robot as a machine: put it somewhere, give it servo commands, let time pass, measure."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from naoimitate.core.frames import SIDES, Array
+from naoimitate.hw.driver import FSR_NAMES
+from naoimitate.robot.model import RobotModel
+from naoimitate.sim.contacts import plate_name
+from naoimitate.sim.model import build_model
+from naoimitate.sim.settings import SimSettings
+
+NORMAL = 0
+"""Index of the normal component in MuJoCo's contact forces."""
+
+
+class Physics:
+    """One simulated robot on its floor. J joints in the order of the ``RobotModel``; the world's floor is z = 0."""
+
+    def __init__(self, robot: RobotModel, settings: SimSettings) -> None:
+        self.model = build_model(robot, settings)
+        self.data = mujoco.MjData(self.model)
+        self._settings = settings
+        joints = [self.model.joint(name) for name in robot.joint_names]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints])
+        followers = {follower for _, follower in robot.coupled}
+        self._driven = np.array([index for index in range(len(joints)) if index not in followers])
+        self._servos = np.array([self.model.actuator(robot.joint_names[index]).id for index in self._driven])
+        self._fsr = np.array([[self._sensor(f"{side}_fsr_{name}") for name in FSR_NAMES] for side in SIDES])
+        self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
+        self._plates = np.array([self.model.body(plate_name(side)).id for side in SIDES])
+        self.foot_load = np.zeros(2)
+        """(2,) N on the left and right sole, mean over the last ``advance``."""
+
+    def _sensor(self, name: str) -> int:
+        return int(self.model.sensor(name).adr[0])
+
+    @property
+    def weight(self) -> float:
+        """N."""
+        return float(self.model.body_mass.sum() * -self.model.opt.gravity[2])
+
+    def place(self, q: Array, base_pos: Array, base_quat: Array) -> None:
+        """Put the robot at rest into a posture, servos commanded to stay there; q (J,) rad, pos (3,) m, quat (4,)."""
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:3], self.data.qpos[3:7] = base_pos, base_quat
+        self.data.qpos[self._qpos] = q
+        self.data.ctrl[self._servos] = q[self._driven]
+        mujoco.mj_forward(self.model, self.data)
+
+    def advance(self, command: Array, duration: float) -> None:
+        """Let ``duration`` (s) pass while the servo commands move in a straight line to ``command`` (J,) rad."""
+        steps = max(1, round(duration / self._settings.timestep))
+        start, end = self.data.ctrl[self._servos], command[self._driven]
+        self.foot_load[:] = 0.0
+        for step in range(1, steps + 1):
+            self.data.ctrl[self._servos] = start + (end - start) * (step / steps)
+            mujoco.mj_step(self.model, self.data)
+            self.foot_load += self.fsr.sum(axis=1) / steps
+
+    @property
+    def time(self) -> float:
+        """Simulated time since ``place``, s."""
+        return float(self.data.time)
+
+    @property
+    def q(self) -> Array:
+        """Joint angles (J,) rad."""
+        return np.array(self.data.qpos[self._qpos])
+
+    @property
+    def torque(self) -> Array:
+        """Servo torques (J,) N m; 0 for followers of a shared motor."""
+        torque = np.zeros(len(self._qpos))
+        torque[self._driven] = self.data.actuator_force[self._servos]
+        return torque
+
+    @property
+    def base_pos(self) -> Array:
+        """Torso in the world, (3,) m."""
+        return np.array(self.data.qpos[:3])
+
+    @property
+    def base_quat(self) -> Array:
+        """Torso in the world, (4,) (w, x, y, z)."""
+        return np.array(self.data.qpos[3:7])
+
+    @property
+    def fsr(self) -> Array:
+        """Foot forces (2, 4) N, as ``RobotState.fsr``."""
+        return np.array(self.data.sensordata[self._fsr])
+
+    @property
+    def accelerometer(self) -> Array:
+        """(3,) m/s^2 in torso axes."""
+        return np.array(self.data.sensordata[self._accelerometer : self._accelerometer + 3])
+
+    @property
+    def gyro(self) -> Array:
+        """(3,) rad/s in torso axes."""
+        return np.array(self.data.sensordata[self._gyro : self._gyro + 3])
+
+    def sole_frames(self) -> tuple[Array, Array]:
+        """Origins (2, 3) m and axes (2, 3, 3) of the left and right sole in the world."""
+        return self.data.xpos[self._plates].copy(), self.data.xmat[self._plates].reshape(2, 3, 3)
+
+    def center_of_pressure(self) -> Array | None:
+        """Where the floor's force on the soles acts, (2,) m in the world; None while nothing is on the floor."""
+        total, moment, force = 0.0, np.zeros(2), np.zeros(6)
+        for index, contact in enumerate(self.data.contact):
+            if any(self.model.geom_bodyid[geom] in self._plates for geom in contact.geom):
+                mujoco.mj_contactForce(self.model, self.data, index, force)
+                total += force[NORMAL]
+                moment += force[NORMAL] * contact.pos[:2]
+        return moment / total if total > 0.0 else None

@@ -1,0 +1,103 @@
+"""Play a planned motion on the servos of the simulated robot, and measure whether it survives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.core.frames import SIDES, Array
+from naoimitate.core.geometry import convex_hull, polygon_margin
+from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.robot.model import RobotModel
+from naoimitate.sim.physics import Physics
+from naoimitate.sim.settings import SimSettings
+from naoimitate.sim.survival import has_fallen, swing_load, tilt
+
+DEFAULT = SimSettings()
+
+SETTLE_TIME = 1.0
+"""How long the robot stands in its first pose before the motion starts, s: servos and soles reach equilibrium."""
+
+
+@dataclass(frozen=True)
+class SimResult:
+    """A motion as it really moved, T frames at the times of the plan.
+
+    time: (T,) s. q: (T, J) rad. base_pos (T, 3) m, base_quat (T, 4): torso in the world.
+    tilt: (T,) rad between the torso's up-axis and its planned direction. height_ratio: (T,) torso height over plan.
+    load: (T, 2) N on the left and right sole, mean since the frame before. swing_load: (T,) share of the weight on the
+    foot planned in the air. cop_margin: (T,) m from the centre of pressure to the edge of the planned stance soles
+    where they really are, negative outside, NaN while the soles carry nothing.
+    fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``survival.has_fallen``).
+    """
+
+    time: Array
+    q: Array
+    base_pos: Array
+    base_quat: Array
+    tilt: Array
+    height_ratio: Array
+    load: Array
+    swing_load: Array
+    cop_margin: Array
+    fell: npt.NDArray[np.bool_]
+
+    @property
+    def survived(self) -> bool:
+        """Whether the robot never fell and no foot in the air carried weight."""
+        return not self.fell.any()
+
+
+def simulate(
+    robot: RobotModel,
+    time: Array,
+    q: Array,
+    base_pos: Array,
+    base_quat: Array,
+    support: npt.NDArray[np.str_],
+    *,
+    stiffness: float = DEFAULT.stiffness,
+    compensation: bool = True,
+    settings: SimSettings = DEFAULT,
+) -> SimResult:
+    """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
+
+    stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's gravity compensation.
+    Each frame's command is under way from the time of the frame before, and is due at its own.
+    """
+    physics = Physics(robot, replace(settings, stiffness=stiffness))
+    commands = q
+    if compensation:
+        gravity = GravityCompensation(robot)
+        commands = np.array(
+            [gravity.command(*frame, stiffness) for frame in zip(q, base_quat, support, strict=True)]
+        )  # fmt: skip
+    physics.place(q[0], base_pos[0], base_quat[0])
+    durations = np.diff(time, prepend=time[0] - SETTLE_TIME)
+    samples = []
+    for command, duration, mode in zip(commands, durations, support, strict=True):
+        physics.advance(command, float(duration))
+        margin = _cop_margin(robot, physics, str(mode))
+        samples.append((physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin))
+    sim_q, sim_pos, sim_quat, load, margin = (np.array(column) for column in zip(*samples, strict=True))
+    lean, height = tilt(base_quat, sim_quat), sim_pos[:, 2] / base_pos[:, 2]
+    swing = swing_load(support, load, physics.weight)
+    return SimResult(
+        time, sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, has_fallen(lean, height, swing)
+    )  # fmt: skip
+
+
+def _cop_margin(robot: RobotModel, physics: Physics, support: str) -> float:
+    """Distance (m) of the centre of pressure to the edge of the soles that should stand; NaN without contact."""
+    point = physics.center_of_pressure()
+    if point is None:
+        return np.nan
+    origins, axes = physics.sole_frames()
+    corners = [
+        origin[:2] + robot.soles[side] @ axis[:2, :2].T
+        for side, origin, axis in zip(SIDES, origins, axes, strict=True)
+        if support in ("D", side.upper())
+    ]
+    return float(polygon_margin(convex_hull(np.concatenate(corners)), *point))
