@@ -1,4 +1,4 @@
-"""From URDF text to flat arrays and shapes; pinocchio reads the mechanism, the collision elements give the shapes."""
+"""From URDF text to flat arrays: joints, masses and frames as pinocchio reads them, in the order of the file."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ import xml.etree.ElementTree as ElementTree
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 import pinocchio as pin
 
 from naoimitate.core.errors import RobotModelError
-from naoimitate.robot.model import BASE, Array, Shape, Tree
+from naoimitate.robot.model import BASE, Array, Tree
 
 Element = ElementTree.Element
 
@@ -34,7 +33,6 @@ class Mechanism(NamedTuple):
     effort: Array
     coupled: tuple[tuple[int, int], ...]
     frames: dict[str, Frame]
-    shapes: tuple[Shape, ...]
 
 
 def parse(urdf: str) -> Element:
@@ -52,7 +50,7 @@ def read_mechanism(urdf: str) -> Mechanism:
     """Read a URDF text. Joints come in the order of the file, parents first; fixed joints weld their links together.
 
     Raises RobotModelError for a joint that is not revolute, a link and a joint of one name, limits that are
-    reversed, a moving link without (possible) mass, and shapes other than box, sphere and cylinder.
+    reversed, and a moving link without mass or with an impossible inertia.
     """
     robot = parse(urdf)
     _check_names(robot)
@@ -71,9 +69,15 @@ def read_mechanism(urdf: str) -> Mechanism:
     speed, effort = model.velocityLimit[6:], model.effortLimit[6:]
     place = [model.joints[joint_id].idx_v - 6 for joint_id in ids]
     mechanism = Mechanism(
-        names, _tree(model, ids, row), lower[place], upper[place], speed[place], effort[place],
-        _coupled(robot, names), frames, _shapes(robot, frames),
-    )  # fmt: skip
+        joint_names=names,
+        tree=_tree(model, ids, row),
+        lower=lower[place],
+        upper=upper[place],
+        speed=speed[place],
+        effort=effort[place],
+        coupled=_coupled(robot, names),
+        frames=frames,
+    )
     _check_limits(mechanism)
     _check_masses(model, [1, *ids])
     return mechanism
@@ -174,43 +178,10 @@ def _check_limits(mechanism: Mechanism) -> None:
 def _check_masses(model: Any, ids: list[int]) -> None:
     """Every moving link needs a mass and an inertia that a real body can have (Wensing et al. 2018, triangle rule)."""
     for i in ids:
-        body, name = model.inertias[i], model.names[i]
+        body = model.inertias[i]
+        link = "the base link" if i == 1 else f"the link behind joint {model.names[i]!r}"
         moments = np.linalg.eigvalsh(body.inertia)
         if body.mass <= 0.0:
-            raise RobotModelError(f"the link behind joint {name!r} has no mass: write its <inertial>")
+            raise RobotModelError(f"{link} has no mass: write its <inertial>")
         if moments[0] <= 0.0 or moments[0] + moments[1] < moments[2]:
-            raise RobotModelError(f"the link behind joint {name!r} has an inertia that no body can have: correct it")
-
-
-def _shapes(robot: Element, frames: dict[str, Frame]) -> tuple[Shape, ...]:
-    return tuple(
-        _shape(collision, frames[link.get("name", "")], link.get("name", ""))
-        for link in robot.findall("link")
-        for collision in link.findall("collision")
-    )
-
-
-def _shape(collision: Element, frame: Frame, link: str) -> Shape:
-    """One collision element in the frame of the moving link; a cylinder stands for the capsule around it."""
-    name = collision.get("name", link)
-    origin, geometry = collision.find("origin"), collision.find("geometry/*")
-    xyz, rpy = (_numbers(origin, key, "0 0 0") for key in ("xyz", "rpy"))
-    rot = frame.rot @ pin.rpy.rpyToMatrix(*rpy)
-    centre = frame.pos + frame.rot @ xyz
-    kind = "" if geometry is None else geometry.tag
-    radius = float(_numbers(geometry, "radius", "0")[0])
-    none = np.zeros(3)
-    if kind == "sphere":
-        return Shape(name, frame.joint, "sphere", centre, centre, radius, none)
-    if kind == "cylinder":
-        arm = 0.5 * float(_numbers(geometry, "length", "0")[0]) * rot[:, 2]
-        return Shape(name, frame.joint, "capsule", centre - arm, centre + arm, radius, none)
-    if kind == "box" and np.allclose(rot, np.eye(3), atol=1e-9):
-        return Shape(name, frame.joint, "box", centre, centre, 0.0, 0.5 * _numbers(geometry, "size", "0 0 0"))
-    raise RobotModelError(
-        f"collision {name!r} of link {link!r}: use a sphere, a cylinder, or a box along the link's axes"
-    )
-
-
-def _numbers(element: Element | None, key: str, default: str) -> npt.NDArray[np.float64]:
-    return np.array([float(x) for x in (element.get(key, default) if element is not None else default).split()])
+            raise RobotModelError(f"{link} has an inertia that no body can have: correct it")
