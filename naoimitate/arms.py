@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.legs import table_bounds
-from naoimitate.balance.stabiliser import Pose
+from naoimitate.balance.clearance import Clearance
+from naoimitate.balance.pose import Pose
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.observer import Observation
 from naoimitate.limb import LimbWeights, build_limb, solve_limb
@@ -19,6 +20,16 @@ _PALM = (yaw_matrix(np.pi / 2), yaw_matrix(-np.pi / 2))
 """Torso from hand link in a T-pose: the links point along x, the human's arms along +-y."""
 
 
+BRANCH_GAIN = 0.006
+"""[m] by which another arm posture must be nearer to the target to be worth a change."""
+BRANCH_PERIOD = 12
+"""Frames between two looks for a better arm posture."""
+BRANCH_SPEED = 0.6
+"""Share of the joints' speed limit at which an arm changes its posture."""
+BRANCH_NEAR = 0.1
+"""[rad] from the other posture at which the hand is followed again."""
+
+
 class Arms:
     """Both arms and the head of a robot."""
 
@@ -27,11 +38,18 @@ class Arms:
         self._limbs = [build_limb(robot, f"{s}_arm", reserve) for s in "lr"]
         self._no_rows = [(np.zeros((0, len(limb.joints))), np.zeros(0)) for limb in self._limbs]
         self._reserve = reserve
+        self._thorough = weights._replace(iterations=30.0)
+        self._transit = weights._replace(tip=0.0, rest=0.1, iterations=1.0)
+        self._anywhere = (np.full(len(robot.joint_names), -10.0), np.full(len(robot.joint_names), 10.0))
+        self._seeds = [np.unique([posture[limb.joints] for posture in robot.postures.values()], axis=0) for limb in self._limbs]
+        self.reset()
         self._head = robot.chains["head"]
         self._table = next((t for t in robot.tables if t.y in self._head), None)
 
     def reset(self) -> None:
         """Forget the past."""
+        self._branch: list[Array | None] = [None, None]
+        self._frames = 0
 
     def hands(self, pose: Pose) -> Array:
         """Hands from the shoulders in the torso frame, (2, 3) m."""
@@ -39,16 +57,48 @@ class Arms:
             pose.link_pos[limb.tip_joint + 1] + pose.link_rot[limb.tip_joint + 1] @ limb.tip - limb.root for limb in self._limbs
         ])
 
-    def solve(self, pose: Pose, targets: Array, seen: Observation, low: Array, high: Array) -> tuple[Array, int]:
+    def solve(self, pose: Pose, targets: Array, seen: Observation, low: Array, high: Array, clearance: Clearance) -> tuple[Array, int]:
         """Joint angles (J,) with both arms moved towards targets (2, 3) m, and the iterations it took."""
         q, iterations = pose.q.copy(), 0
+        self._frames += 1
         for side, limb in enumerate(self._limbs):
-            rotation, rows = self._tip(pose, seen, side)
-            done, _ = solve_limb(
-                self._robot.tree, limb, self._weights, targets[side], seen.body.elbows[side], rotation, rows, q, low, high, *self._no_rows[side]
-            )
+            task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
+            rows = clearance.limb_rows(pose, limb.joints)
+            if self._branch[side] is not None:
+                iterations += self._change_branch(side, q, task, low, high, rows)
+                continue
+            done, error = solve_limb(self._robot.tree, limb, self._weights, *task, q, low, high, *rows)
             iterations += done
+            if error > BRANCH_GAIN and self._frames % BRANCH_PERIOD == side:
+                iterations += self._look_for_branch(side, q, task, error)
         return q, iterations
+
+    def _look_for_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], error: float) -> int:
+        """Start afresh from other postures; keep the best arm posture that is clearly nearer to the target."""
+        limb, iterations = self._limbs[side], 0
+        for seed in self._seeds[side]:
+            trial = q.copy()
+            trial[limb.joints] = seed
+            done, found = solve_limb(self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side])
+            iterations += done
+            if found < error - BRANCH_GAIN:
+                error, self._branch[side] = found, trial[limb.joints]
+        return iterations
+
+    def _change_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], low: Array, high: Array, rows: tuple[Array, Array]) -> int:
+        """Move an arm of q through joint space towards its other posture, until that is near."""
+        limb, goal = self._limbs[side], q.copy()
+        goal[limb.joints] = self._branch[side]
+        done, _ = solve_limb(self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side])
+        way = limb._replace(rest=goal[limb.joints])
+        before = q[limb.joints]
+        slow_low, slow_high = q + BRANCH_SPEED * (low - q), q + BRANCH_SPEED * (high - q)
+        free = (task[0], np.zeros(3), task[2], 0)
+        more, _ = solve_limb(self._robot.tree, way, self._transit, *free, q, slow_low, slow_high, *rows)
+        near = np.abs(q[limb.joints] - way.rest).max() < BRANCH_NEAR
+        stuck = np.abs(q[limb.joints] - before).max() < 1e-4
+        self._branch[side] = None if near or stuck else way.rest
+        return done + more
 
     def _tip(self, pose: Pose, seen: Observation, side: int) -> tuple[Array, int]:
         """Orientation asked of a hand in the base frame, and how many of its rows count."""

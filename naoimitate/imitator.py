@@ -9,10 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.arms import Arms
+from naoimitate.balance.clearance import Clearance, ClearanceSettings
 from naoimitate.balance.landing import landing_set
 from naoimitate.balance.legs import LegLimits, LegWeights, build_legs, hip_positions
 from naoimitate.balance.offset import OffsetLaw, normalised_offset
-from naoimitate.balance.stabiliser import Footing, Plan, Pose, Stabiliser
+from naoimitate.balance.pose import Pose
+from naoimitate.balance.stabiliser import Footing, Plan, Stabiliser
 from naoimitate.balance.swing import SwingSettings
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import CalibrationError
@@ -49,6 +51,7 @@ class Settings:
     legs: LegLimits = field(default_factory=LegLimits)
     leg_weights: LegWeights = field(default_factory=LegWeights)
     arm_weights: LimbWeights = field(default_factory=LimbWeights)
+    clearance: ClearanceSettings = field(default_factory=ClearanceSettings)
     gate: GateLimits = field(default_factory=GateLimits)
 
 
@@ -64,7 +67,7 @@ class Imitator:
         self._arms = Arms(robot, s.arm_weights, s.legs.range_reserve, s.hand_orientation)
         self._hips = hip_positions(robot)
         self._stabiliser = Stabiliser(robot, self._legs, landing_set(robot), s.leg_weights, s.offset, s.swing)
-        self._no_rows = (np.zeros((0, len(self._legs.joints))), np.zeros(0))
+        self._clearance = Clearance(robot, s.clearance)
         self._subject: Subject | None = None
         self._pose: Pose | None = None
 
@@ -116,14 +119,19 @@ class Imitator:
         plan = stabiliser.plan(pose, footing, dt)
         hands = self._hands.step(targets[_HAND_ROWS], dt)
         feet = self._feet.step(targets[_FEET_ROWS], dt)
-        q_arms, iterations = self._arms.solve(pose, hands, seen, low, high)
+        self._clearance.look(pose)
+        nearest = self._clearance.nearest
+        q_arms, iterations = self._arms.solve(pose, hands, seen, low, high, self._clearance)
         self._arms.head(q_arms, seen.head, self.settings.limits.head_speed * dt, low, high)
         for scale in _SCALES:
             q = pose.q + scale * (q_arms - pose.q)
-            done, closed = stabiliser.solve(q, plan, pose, feet, scale, (low, high), *self._no_rows)
+            moved = stabiliser.pose(q)
+            self._clearance.look(moved)
+            rows = self._clearance.leg_rows(moved, self._legs, stabiliser.base_side)
+            done, closed = stabiliser.solve(q, plan, pose, feet, scale, (low, high), *rows)
             iterations += done
             candidate = stabiliser.pose(q)
-            if closed and self._safe(candidate, pose, plan, scale, dt):
+            if closed and self._safe(candidate, pose, nearest, dt):
                 stabiliser.accept(plan, scale)
                 self._pose = candidate
                 if scale < 1.0:
@@ -133,8 +141,8 @@ class Imitator:
         self._restart_tasks()
         return self._reasons(seen, targets, footing, plan) | GivenUp.HOLD, iterations
 
-    def _safe(self, pose: Pose, before: Pose, plan: Plan, scale: float, dt: float) -> bool:
-        """The gate: ranges, speeds, planted soles, margin."""
+    def _safe(self, pose: Pose, before: Pose, nearest: float, dt: float) -> bool:
+        """The gate: ranges, speeds, planted soles, clearance (``nearest`` before the step), margin."""
         limits, s = self.settings.gate, self._stabiliser
         if range_excess(self._gate, pose.q) > 0.0 or speed_ratio(self._gate, pose.q, before.q, dt) > limits.speed_share:
             return False
@@ -144,6 +152,9 @@ class Imitator:
                 self._legs, side, pose.sole_pos[side], pose.sole_rot[side], s.planted_pos[side], s.planted_rot[side]
             ) > limits.slip:
                 return False
+        self._clearance.look(pose)
+        if self._clearance.nearest < min(nearest, -limits.overlap):
+            return False
         margin = support_margin(self._legs, pose.sole_pos, pose.sole_rot, left, right, pose.com)
         if margin < limits.margin:
             return bool(margin >= support_margin(self._legs, before.sole_pos, before.sole_rot, left, right, before.com))
@@ -178,10 +189,11 @@ class Imitator:
             s.planted_pos[0] = start_pos[0] + part * (goal - start_pos[0])
             s.planted_rot[0] = yaw_matrix(part * place[1])
             low, high = pose.q - 0.1, pose.q + 0.1
-            q, _ = self._arms.solve(pose, targets[_HAND_ROWS], seen, low, high)
+            self._clearance.look(pose)
+            q, _ = self._arms.solve(pose, targets[_HAND_ROWS], seen, low, high, self._clearance)
             self._arms.head(q, seen.head, 0.1, low, high)
             plan = Plan(s.offset, 0.0, s.planted_pos[0], s.planted_rot[0], 0, 0.0, False, False)
-            _, closed = s.solve(q, plan, pose, targets[_FEET_ROWS], 1.0, (low, high), *self._no_rows)
+            _, closed = s.solve(q, plan, pose, targets[_FEET_ROWS], 1.0, (low, high), *self._clearance.leg_rows(pose, self._legs, s.base_side))
             if closed:
                 pose = s.pose(q)
         self._centre(pose)

@@ -30,6 +30,9 @@ POSE = 0
 FREE = 1
 """The other sole swings: its place in the torso frame and its level are tasks, its height a bound."""
 
+TABLE_RESERVE = 5e-4
+"""[rad] kept from the coupling tables."""
+
 
 class Legs(NamedTuple):
     """Flat description of both legs for the compiled solver.
@@ -161,7 +164,7 @@ def base_pose(tree: Tree, legs: Legs, stance: Stance, pos: Array, rot: Array, R_
 
 
 @njit(cache=True)
-def _reduce(J: Array, legs: Legs, out: Array) -> None:
+def reduce_columns(J: Array, legs: Legs, out: Array) -> None:
     """Columns of the joints to columns of the free variables: a follower's motion is its leader's."""
     out[:] = 0.0
     for j in range(J.shape[1]):
@@ -172,7 +175,7 @@ def _reduce(J: Array, legs: Legs, out: Array) -> None:
 
 
 @njit(cache=True)
-def _cross_rows(v: Array, W: Array, out: Array) -> None:
+def add_cross(v: Array, W: Array, out: Array) -> None:
     """out += skew(v) W, (3, n)."""
     for k in range(W.shape[1]):
         out[0, k] += v[1] * W[2, k] - v[2] * W[1, k]
@@ -234,23 +237,23 @@ def solve_legs(
         if iteration == limit or (iteration > 0 and np.abs(x).max() < 1e-6 and closure < 1e-8):
             break
         point_jacobian(tree, pos, rot, ls, ps, J)
-        _reduce(J, legs, Js)
+        reduce_columns(J, legs, Js)
         angular_jacobian(tree, pos, rot, ls, J)
-        _reduce(J, legs, Ws)
+        reduce_columns(J, legs, Ws)
         point_jacobian(tree, pos, rot, lo, po, J)
-        _reduce(J, legs, Jo)
+        reduce_columns(J, legs, Jo)
         angular_jacobian(tree, pos, rot, lo, J)
-        _reduce(J, legs, Wo)
+        reduce_columns(J, legs, Wo)
         com_jacobian(tree, pos, rot, J)
-        _reduce(J, legs, Jc)
+        reduce_columns(J, legs, Jc)
         H, g = np.zeros((n, n)), np.zeros(n)
         _add_task(Js, goal.feet[s] - (ps - legs.hip[s]), weights.foot * goal.foot_weight[s], H, g)
         _add_task(Jo, goal.feet[o] - (po - legs.hip[o]), weights.foot * goal.foot_weight[o], H, g)
         Jc -= Js
-        _cross_rows(com - ps, Ws, Jc)
+        add_cross(com - ps, Ws, Jc)
         _add_task((R_wb @ Jc)[:2], e_com, weights.com, H, g)
         Jow = Jo - Js
-        _cross_rows(po - ps, Ws, Jow)
+        add_cross(po - ps, Ws, Jow)
         Jow, Wow = R_wb @ Jow, R_wb @ (Wo - Ws)
         C[:] = 0.0
         row = equalities
@@ -297,8 +300,8 @@ def _table_rows(legs: Legs, q: Array, C: Array, b: Array, row: int) -> int:
         table = legs.table_rows[t]
         low, low_slope, high, high_slope = table_bounds(table, q[jx])
         vx, vy = legs.variable[jx], legs.variable[jy]
-        C[row, vy], C[row, vx], b[row] = 1.0, -low_slope, low - q[jy]
-        C[row + 1, vy], C[row + 1, vx], b[row + 1] = -1.0, high_slope, q[jy] - high
+        C[row, vy], C[row, vx], b[row] = 1.0, -low_slope, low + TABLE_RESERVE - q[jy]
+        C[row + 1, vy], C[row + 1, vx], b[row + 1] = -1.0, high_slope, q[jy] - high + TABLE_RESERVE
         row += 2
     return row
 

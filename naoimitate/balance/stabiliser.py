@@ -18,6 +18,7 @@ from naoimitate.balance.legs import (
     base_pose,
     solve_legs,
 )
+from naoimitate.balance.pose import Pose
 from naoimitate.balance.offset import OffsetLaw, advance, normalised_offset
 from naoimitate.balance.swing import Swing, SwingSettings
 from naoimitate.core.geometry import heading, matrix_from_rotation_vector, rotation_vector, wrap, yaw_matrix
@@ -29,24 +30,6 @@ Array = npt.NDArray[np.float64]
 
 CLOSED = 2e-5
 """Sum of m and rad by which a planted sole may differ from where it stands after a solve."""
-
-
-@dataclass
-class Pose:
-    """A whole-body pose of the robot in the world, with what is derived from it.
-
-    q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m, world. sole_pos: (2, 3) m, sole_rot: (2, 3, 3), world.
-    link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them.
-    """
-
-    q: Array
-    base_rot: Array
-    base_pos: Array
-    com: Array
-    sole_pos: Array
-    sole_rot: Array
-    link_pos: Array
-    link_rot: Array
 
 
 @dataclass(frozen=True)
