@@ -86,6 +86,10 @@ class Imitator:
         self._pose = None
         self._time, self._last_time = 0.0, math.nan
         self._human_offset = 0.5
+        still = np.zeros((2, 3))
+        limits = self.settings.limits
+        self._hands = Follower(still, limits.hand_speed, limits.hand_acceleration)
+        self._feet = Follower(still, limits.foot_speed, limits.foot_acceleration)
 
     def step(self, frame: HumanFrame, dt: float | None = None, *, support: str | None = None, ahead: str = "", may_lift: bool = True) -> RobotCommand:
         """Imitate one frame, dt s (default: the difference of frame times) after the last one.
@@ -107,6 +111,24 @@ class Imitator:
             given_up, iterations = self._advance(seen, targets, footing, elapsed)
         self._last_time = frame.time
         return self._command(seen, footing, given_up, iterations)
+
+    @property
+    def mode(self) -> Mode:
+        """The robot's support mode."""
+        return self._stabiliser.mode
+
+    @property
+    def offset(self) -> float:
+        """The robot's normalised CoM offset, 0 left foot to 1 right foot."""
+        return self._stabiliser.offset
+
+    @property
+    def lag(self) -> float:
+        """How far (m) the hands and a swing foot are behind their targets at their speed limits."""
+        behind = [self._hands.behind]
+        if self.mode is not Mode.DOUBLE:
+            behind.append(self._feet.behind[1 - self._stabiliser.base_side :][:1])
+        return float(np.max(np.concatenate(behind)))
 
     # -- one frame ------------------------------------------------------------------------------------------------
 
@@ -199,9 +221,6 @@ class Imitator:
         self._centre(pose)
         self._pose = s.pose(pose.q)
         self._time = 0.0
-        limits = self.settings.limits
-        self._hands = Follower(np.zeros((2, 3)), limits.hand_speed, limits.hand_acceleration)
-        self._feet = Follower(np.zeros((2, 3)), limits.foot_speed, limits.foot_acceleration)
         self._restart_tasks()
         return self._reasons(seen, targets, steady, plan)
 
@@ -250,8 +269,9 @@ class Imitator:
             base_pos=pose.base_pos.copy(),
             base_quat=quat_from_matrix(pose.base_rot),
             support=self._stabiliser.mode.stance,
-            offset=self._stabiliser.measured_offset(pose),
+            offset=min(max(self._stabiliser.measured_offset(pose), 0.0), 1.0),
             com=pose.com.copy(),
+            soles=pose.sole_pos.copy(),
             posture=seen.body.posture,
             human_support=seen.support,
             human_offset=footing.offset,

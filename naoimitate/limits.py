@@ -47,9 +47,15 @@ class Follower:
         follow(self.position, self.velocity, self._target, np.ascontiguousarray(target), dt, self._speed, self._acceleration)
         return self.position
 
+    @property
+    def behind(self) -> Array:
+        """Distance (K,) m of the points to the targets they were last given."""
+        return np.asarray(np.linalg.norm(self._target - self.position, axis=1))
+
     def restart(self, position: Array) -> None:
         """Stand still at a position, after a held frame."""
         self.position[:] = position
+        self._target[:] = position
         self.velocity[:] = 0.0
 
 

@@ -1,0 +1,168 @@
+"""A recorded motion, imitated from its first to its last frame: the run."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from naoimitate.calib.subject import Subject, calibrate
+from naoimitate.core.errors import MotionFormatError
+from naoimitate.core.frames import Motion, RobotCommand
+from naoimitate.imitator import Imitator, Settings
+from naoimitate.robot.model import RobotModel
+from naoimitate.run.file import Run
+from naoimitate.run.pace import AutoPace, ConstantPace
+from naoimitate.run.provenance import provenance
+
+LONGEST = 40.0
+"""A run is ended after this many times the length of the clip, plus a minute: nothing waits for ever."""
+
+
+def imitate(
+    motion: Motion,
+    robot: RobotModel,
+    settings: Settings | None = None,
+    *,
+    speed: float | str = 1.0,
+    rate: float = 100.0,
+    sample: float | None = None,
+    start: float | None = None,
+    end: float | None = None,
+    subject: Subject | None = None,
+    subject_sha256: str | None = None,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Imitate a recorded motion.
+
+    speed: factor, or ``auto``: slowed where the robot needs the time. rate: Hz of the robot's commands. sample: Hz at
+    which the person is seen, None for the file's own. start, end: s in the file's time. subject: who was measured
+    before; else the motion's T-pose is used. progress: called with the share of the clip that is done.
+    Raises MotionFormatError for a motion without a T-pose or an empty stretch, CalibrationError for an unusable T-pose.
+    """
+    settings = settings or Settings()
+    motion = _stretch(motion, start, end)
+    seen = motion if sample is None else resample(motion, sample)
+    if subject is None:
+        if motion.tpose is None:
+            raise MotionFormatError(f"{motion.name} has no T-pose: give --subject, or --tpose-at with its time")
+        subject = calibrate(motion.tpose)
+    imitator = Imitator(robot, settings)
+    imitator.use(subject)
+    law = (
+        AutoPace(seen, float(seen.time[0]), settings.offset)
+        if speed == "auto"
+        else ConstantPace(seen, float(seen.time[0]), float(speed))
+    )
+    commands, moments, step_times = _play(imitator, law, seen, 1.0 / rate, progress)
+    text = provenance(
+        settings,
+        source_sha256=motion.sha256,
+        subject_sha256=subject_sha256,
+        seed=seed,
+        notes=motion.notes,
+        speed=speed,
+        rate=rate,
+        sample=sample,
+        start=start,
+        end=end,
+    )
+    return _run(robot, settings, motion, imitator, text, commands, np.array(moments), np.array(step_times))
+
+
+def resample(motion: Motion, rate: float) -> Motion:
+    """The motion as a camera of ``rate`` Hz sees it."""
+    times = np.arange(motion.time[0], motion.duration + 0.5 / rate, 1.0 / rate)
+    frames = [motion.at(float(t)) for t in times]
+
+    def stack(name: str) -> np.ndarray | None:
+        values = [getattr(f, name) for f in frames]
+        return None if values[0] is None else np.array(values)
+
+    return replace(
+        motion,
+        time=times,
+        **{k: stack(k) for k in ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")},
+    )
+
+
+def _stretch(motion: Motion, start: float | None, end: float | None) -> Motion:
+    keep = (motion.time >= (-np.inf if start is None else start)) & (motion.time <= (np.inf if end is None else end))
+    if not keep.any():
+        raise MotionFormatError(
+            f"no frame between --start and --end: {motion.name} lasts from {motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
+        )
+    if keep.all():
+        return motion
+    fields = ("time", "landmarks", "orientations", "com", "contacts", "support", "hand_opening")
+    return replace(motion, **{k: None if getattr(motion, k) is None else getattr(motion, k)[keep] for k in fields})
+
+
+def _play(
+    imitator: Imitator,
+    law: AutoPace | ConstantPace,
+    motion: Motion,
+    dt: float,
+    progress: Callable[[float], None] | None,
+) -> tuple[list[RobotCommand], list[float], list[float]]:
+    first, last = float(motion.time[0]), motion.duration
+    commands = [imitator.step(motion.at(first), dt)]
+    moments, step_times = [first], [0.0]
+    longest = 60.0 + LONGEST * (last - first)
+    while law.time < last - 1e-9 and commands[-1].time < longest:
+        moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag)
+        begin = clock.perf_counter()
+        commands.append(imitator.step(motion.at(moment.time), dt, support=moment.support, ahead=moment.ahead))
+        step_times.append(clock.perf_counter() - begin)
+        moments.append(min(moment.time, last))
+        if progress is not None:
+            progress((moments[-1] - first) / (last - first))
+    return commands, moments, step_times
+
+
+def _run(
+    robot: RobotModel,
+    settings: Settings,
+    motion: Motion,
+    imitator: Imitator,
+    text: str,
+    commands: list[RobotCommand],
+    moments: np.ndarray,
+    step_times: np.ndarray,
+) -> Run:
+    support = np.array([c.support for c in commands])
+    contacts = np.stack([support != "R", support != "L"], axis=1)
+    mapping = imitator.mapping
+    return Run(
+        robot=robot.name,
+        robot_version=robot.version,
+        method="static",
+        retarget=settings.retarget,
+        source=motion.source or motion.name,
+        provenance=text,
+        time=np.array([c.time for c in commands]),
+        human_time=moments,
+        joint_names=np.array(robot.joint_names),
+        q=np.array([c.q for c in commands]),
+        base_pos=np.array([c.base_pos for c in commands]),
+        base_quat=np.array([c.base_quat for c in commands]),
+        support=support,
+        human_support=np.array([motion.at(float(t)).support or "D" for t in moments]),
+        contact_names=np.array(["l_sole", "r_sole"]),
+        contacts=contacts,
+        contact_points=np.where(contacts[:, :, None], np.array([c.soles for c in commands]), np.nan),
+        offset=np.array([c.offset for c in commands]),
+        human_offset=np.array([c.human_offset for c in commands]),
+        com=np.array([c.com for c in commands]),
+        human_posture=np.array([c.posture for c in commands]),
+        ref_human=mapping.ref_human,
+        ref_robot=mapping.ref_robot,
+        scale=mapping.scale,
+        hand_opening=np.array([c.hand_opening for c in commands]),
+        given_up=np.array([int(c.given_up) for c in commands], dtype=np.uint8),
+        step_time=step_times,
+        ik_iterations=np.array([c.ik_iterations for c in commands]),
+    )
