@@ -99,7 +99,7 @@ def save(run: Run, path: str | Path) -> None:
 
     Raises RunFileError when the run breaks the schema, or the folder cannot be written.
     """
-    arrays = {key: np.asarray(value) for key in KEYS if (value := getattr(run, key)) is not None}
+    arrays: dict[str, Any] = {key: np.asarray(value) for key in KEYS if (value := getattr(run, key)) is not None}
     check(convert(arrays))
     path = Path(path)
     try:
@@ -127,7 +127,8 @@ def load_run(path: str | Path) -> Run:
         check(checked)
     except RunFileError as error:
         raise RunFileError(f"{path}: {error}") from error
-    return Run(**{key: value.item() if value.ndim == 0 else value for key, value in checked.items()})
+    values: dict[str, Any] = {key: value.item() if value.ndim == 0 else value for key, value in checked.items()}
+    return Run(**values)
 
 
 def _read(path: Path) -> dict[str, npt.NDArray[Any]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Any
 
@@ -12,7 +11,7 @@ PROGRAM = "naoimitate"
 
 
 def provenance(
-    settings: Mapping[str, Any] | object,
+    settings: Any,
     *,
     source_sha256: str,
     seed: int,
@@ -26,12 +25,11 @@ def provenance(
     of the motion and of the subject file, None without one. notes: what the reader recognised, corrected or assumed.
     more: further settings of the run that are no part of ``settings`` (speed, rate, start, end...).
     """
-    values = dataclasses.asdict(settings) if _is_dataclass(settings) else dict(settings)  # type: ignore[call-overload]
     return json.dumps(
         {
             "program": PROGRAM,
             "version": version(PROGRAM),
-            "settings": {**values, **more},
+            "settings": {**_values(settings), **more},
             "source_sha256": source_sha256,
             "subject_sha256": subject_sha256,
             "seed": seed,
@@ -48,5 +46,7 @@ def settings_of(provenance_text: str) -> dict[str, Any]:
     return settings if isinstance(settings, dict) else {}
 
 
-def _is_dataclass(value: object) -> bool:
-    return dataclasses.is_dataclass(value) and not isinstance(value, type)
+def _values(settings: Any) -> dict[str, Any]:
+    if dataclasses.is_dataclass(settings) and not isinstance(settings, type):
+        return dataclasses.asdict(settings)
+    return dict(settings)

@@ -13,6 +13,7 @@ from numba import njit
 
 from naoimitate.core.errors import RunFileError
 from naoimitate.core.geometry import convex_hull, matrix_from_quat, polygon_margin
+from naoimitate.mapping import Mapping
 from naoimitate.robot.kernel import center_of_mass, forward
 from naoimitate.robot.model import RobotModel, Tree
 from naoimitate.run.file import Run
@@ -50,14 +51,14 @@ class Replay:
     def margins(self, support: npt.NDArray[np.str_]) -> Array:
         """Signed distance of the centre of mass to the edge of the support polygon, (N,) m, positive inside."""
         left, right = self.soles[0][:, :, :2], self.soles[1][:, :, :2]
-        carries = np.array([LOADED[mode] for mode in support])
+        carries = np.array([LOADED[mode] for mode in support], dtype=np.bool_).reshape(-1, 2)
         return np.asarray(_margins(left, right, carries, self.com))
 
 
 def replay(robot: RobotModel, q: Array, base_pos: Array, base_quat: Array) -> Replay:
     """Poses from joint angles (N, J) rad and the torso's pose (N, 3) m, (N, 4) (w, x, y, z)."""
     links_pos, links_rot, com = _forward_all(robot.tree, q)
-    base_rot = np.array([matrix_from_quat(quat) for quat in base_quat])
+    base_rot = np.array([matrix_from_quat(quat) for quat in base_quat]).reshape(-1, 3, 3)
     soles, up = [], []
     for side in SIDES:
         point = robot.points[f"{side}_sole"]
@@ -94,7 +95,7 @@ def midpoints(run: Run, robot: RobotModel) -> Replay:
 
 def targets(run: Run) -> Array:
     """Equations (2), (3), (5) of Koenemann et al. 2014: f_R = f_ref,R + m (f_H - f_ref,H), (T, 4, 3) m, torso frame."""
-    return np.asarray(run.ref_robot + run.scale[:, None] * (run.human_posture - run.ref_human))
+    return Mapping(run.ref_human, run.ref_robot, run.scale).targets(run.human_posture)
 
 
 def place(robot: RobotModel, poses: Replay, name: str) -> Array:

@@ -78,7 +78,7 @@ _KINDS = {str: "U", float: "fiu", int: "iu", bool: "b", np.uint8: "u"}
 
 def convert(arrays: Arrays) -> dict[str, npt.NDArray[Any]]:
     """The arrays of a run in the types of the schema. Raises RunFileError for a missing key or another type."""
-    result = {}
+    result: dict[str, npt.NDArray[Any]] = {}
     for name, key in SCHEMA.items():
         if name not in arrays:
             if not key.optional:

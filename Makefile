@@ -1,0 +1,24 @@
+# `make demo` and `make test` work in a fresh clone: each makes its own virtual environment, installs, and runs.
+
+PYTHON ?= python3
+VENV ?= .venv
+INSTALLED = $(VENV)/.installed-by-make
+
+.PHONY: demo test run-tests clean
+
+demo: $(INSTALLED)
+	$(VENV)/bin/naoimitate demo
+
+test: $(INSTALLED) run-tests
+
+run-tests:
+	$(VENV)/bin/pytest
+
+$(INSTALLED): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(VENV)/bin/python -m pip install --quiet --upgrade pip
+	$(VENV)/bin/python -m pip install --quiet --editable ".[test]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) build dist naoimitate.egg-info naoimitate-demo .ci/work
