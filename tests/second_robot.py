@@ -100,7 +100,7 @@ DATA = {
 def write_second_robot(folder: Path) -> Path:
     """Write robot.urdf and robot.yaml into a folder and return it."""
     (folder / "robot.urdf").write_text(urdf(), encoding="utf-8")
-    (folder / "robot.yaml").write_text(yaml.safe_dump(DATA), encoding="utf-8")
+    (folder / "robot.yaml").write_text(yaml.safe_dump(DATA, sort_keys=False), encoding="utf-8")
     return folder
 
 

@@ -87,9 +87,8 @@ def both_sides(data: Mapping[str, Any], mirror: Mirror) -> dict[str, Any]:
 def _sided(section: Mapping[str, Any], mirrored: Callable[[Any], Any]) -> dict[str, Any]:
     """A section with keys ``l`` or ``l_...`` completed by the missing ``r`` or ``r_...``."""
     left = {key: value for key, value in section.items() if key == "l" or key.startswith("l_")}
-    return {"r" + key[1:]: mirrored(value) for key, value in left.items() if "r" + key[1:] not in section} | dict(
-        section
-    )
+    right = {"r" + key[1:]: mirrored(value) for key, value in left.items()}
+    return {**section, **{key: value for key, value in right.items() if key not in section}}
 
 
 def _known(names: Iterable[str], joints: Mapping[str, Any]) -> None:

@@ -49,11 +49,11 @@ def parse(urdf: str) -> Element:
 def read_mechanism(urdf: str) -> Mechanism:
     """Read a URDF text. Joints come in the order of the file, parents first; fixed joints weld their links together.
 
-    Raises RobotModelError for a joint that is not revolute, a link and a joint of one name, limits that are
+    Raises RobotModelError for a joint that is not revolute, a name that is given twice, a broken tree, limits that are
     reversed, and a moving link without mass or with an impossible inertia.
     """
     robot = parse(urdf)
-    _check_names(robot)
+    _check_structure(robot)
     model = _build(robot)
     names = _order(robot, model)
     ids = [model.getJointId(name) for name in names]
@@ -93,16 +93,35 @@ def zero_frames(tree: Tree) -> tuple[Array, Array]:
     return pos, rot
 
 
-def _check_names(robot: Element) -> None:
-    links, joints = ([e.get("name", "") for e in robot.findall(tag)] for tag in ("link", "joint"))
-    for name in set(links) & set(joints):
-        raise RobotModelError(f"robot.urdf calls a link and a joint {name!r}: rename one of them")
-    for joint in robot.findall("joint"):
-        if joint.get("type") not in ("revolute", "fixed"):
-            raise RobotModelError(
-                f"joint {joint.get('name')!r} is of type {joint.get('type')!r}: "
-                "only revolute joints with limits and fixed joints can be used"
-            )
+def _check_structure(robot: Element) -> None:
+    """Names, joint types and the tree, so that the reader behind us has nothing to complain about."""
+    links = [link.get("name", "") for link in robot.findall("link")]
+    names = [joint.get("name", "") for joint in robot.findall("joint")]
+    for name in {*links, *names}:
+        if (links + names).count(name) > 1:
+            raise RobotModelError(f"robot.urdf gives the name {name!r} twice, to links or joints: rename one of them")
+    children = [_check_joint(joint, links) for joint in robot.findall("joint")]
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1 or len(set(children)) != len(children):
+        raise RobotModelError(
+            f"robot.urdf is no tree with one base link (roots: {roots}): give each link one parent joint"
+        )
+
+
+def _check_joint(joint: Element, links: list[str]) -> str:
+    """Child link of a joint that can be used."""
+    name, kind = joint.get("name", ""), joint.get("type")
+    if kind not in ("revolute", "fixed") or (kind == "revolute" and joint.find("limit") is None):
+        raise RobotModelError(
+            f"joint {name!r} ({kind}): only fixed joints and revolute joints with a <limit> can be used"
+        )
+    ends = []
+    for tag in ("parent", "child"):
+        element = joint.find(tag)
+        ends.append("" if element is None else element.get("link", ""))
+        if ends[-1] not in links:
+            raise RobotModelError(f"joint {name!r}: its {tag} link {ends[-1]!r} does not exist, correct the name")
+    return ends[1]
 
 
 def _build(robot: Element) -> Any:
