@@ -40,7 +40,7 @@ def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjS
     """
     spec = mujoco.MjSpec.from_string(robot.urdf)
     bodies = _bodies(spec, robot)
-    spec.compiler.fusestatic = False
+    spec.compiler.fusestatic = spec.compiler.discardvisual = False
     _remove_imported_geoms(spec)
     bodies[BASE].add_freejoint(name="base")
     _set_options(spec, settings)
@@ -52,7 +52,7 @@ def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjS
     add_force_sensors(spec, robot)
     add_cameras(spec, robot)
     add_looks(spec, bodies, robot)
-    add_scene(spec, settings.friction)
+    add_scene(spec, bodies[BASE], settings.friction)
     return spec
 
 

@@ -31,6 +31,7 @@ class Physics:
         self._fsr = np.array([[self._sensor(f"{side}_fsr_{name}") for name in FSR_NAMES] for side in SIDES])
         self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
         self._plates = np.array([self.model.body(plate_name(side)).id for side in SIDES])
+        mujoco.mj_forward(self.model, self.data)
         self.foot_load = np.zeros(2)
         """(2,) N on the left and right sole, mean over the last ``advance``."""
 

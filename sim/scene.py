@@ -23,37 +23,43 @@ MATERIALS = {
     "right": (0.95, 0.50, 0.15, 1.0),
 }
 
-LOOKS_GROUP = 1
-"""MuJoCo's geom group of what is drawn but touches nothing."""
+LOOKS_GROUP, FLOOR_GROUP = 1, 2
+"""MuJoCo's geom groups of what is drawn but touches nothing, and of the floor."""
 
 FLOOR_TILE = 0.1
 """Side of a floor tile, m: a scale in every picture."""
+
+FIELD_OF_VIEW = 30.0
+"""Vertical, deg: a long lens, so that two figures side by side keep their proportions."""
 
 PICTURE_SIZE = (1920, 1080)
 """Largest off-screen picture, pixels."""
 
 
-def add_scene(spec: mujoco.MjSpec, friction: float) -> None:
-    """Add floor, sky and lights; the floor is the geom ``floor`` at z = 0."""
+def add_scene(spec: mujoco.MjSpec, torso: Any, friction: float) -> None:
+    """Add floor, sky and lights; the floor is the geom ``floor`` at z = 0, the lights go with the torso."""
     _add_textures(spec)
     floor = spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
-    floor.material = "floor"
+    floor.material, floor.group = "floor", FLOOR_GROUP
     floor.contype, floor.conaffinity = 1, 0
     floor.friction[0] = friction
     for position, direction, strength, shadow in (
-        ([0.5, 0.8, 2.5], [-0.15, -0.3, -1.0], 0.55, True),
+        ([0.3, 0.6, 2.0], [-0.15, -0.3, -1.0], 0.55, True),
         ([2.0, -1.0, 1.5], [-1.0, 0.5, -0.8], 0.25, False),
     ):
-        light = spec.worldbody.add_light(pos=position, dir=direction, castshadow=shadow)
+        light = torso.add_light(pos=position, dir=direction, castshadow=shadow)
         light.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+        light.mode = mujoco.mjtCamLight.mjCAMLIGHT_TRACK
         light.diffuse = [strength] * 3
         light.specular = [0.1] * 3
     spec.visual.headlight.ambient = [0.35] * 3
     spec.visual.headlight.diffuse = [0.2] * 3
     spec.visual.headlight.specular = [0.05] * 3
-    spec.visual.quality.shadowsize = 4096
-    spec.visual.quality.offsamples = 8
+    spec.visual.quality.shadowsize = 2048
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = 20, 10
+    spec.visual.global_.fovy = FIELD_OF_VIEW
     spec.visual.global_.offwidth, spec.visual.global_.offheight = PICTURE_SIZE
+    spec.stat.extent = 2.0  # m around the robot that shadows cover
 
 
 def _add_textures(spec: mujoco.MjSpec) -> None:
@@ -65,7 +71,7 @@ def _add_textures(spec: mujoco.MjSpec) -> None:
         name="tiles", type=mujoco.mjtTexture.mjTEXTURE_2D, builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER,
         rgb1=[0.62, 0.65, 0.68], rgb2=[0.70, 0.73, 0.76], width=256, height=256,
     )  # fmt: skip
-    floor = spec.add_material(name="floor", texuniform=True, texrepeat=[0.5 / FLOOR_TILE] * 2, reflectance=0.03)
+    floor = spec.add_material(name="floor", texuniform=True, texrepeat=[0.5 / FLOOR_TILE] * 2)
     floor.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "tiles"
 
 

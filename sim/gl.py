@@ -1,0 +1,72 @@
+"""Off-screen OpenGL: a canvas that turns a MuJoCo scene into an array of pixels, with or without a screen."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import sys
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.core.errors import RenderingUnavailable
+
+Image = npt.NDArray[np.uint8]
+
+NO_GL = (
+    "No pictures: OpenGL does not work here ({reason}). Install a software renderer (Debian, Ubuntu: apt install "
+    "libegl1 libgl1-mesa-dri, or libosmesa6), or set MUJOCO_GL to egl, osmesa or glfw; all but pictures works without"
+)
+
+
+class Canvas:
+    """Draws scenes of one model. Raises RenderingUnavailable, with what to install, where no OpenGL works."""
+
+    def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
+        reasons = []
+        for backend in backends():
+            try:
+                self._open(backend, model, width, height)
+                break
+            except Exception as error:  # every library fails in its own way
+                reasons.append(f"{backend}: {(str(error) or type(error).__name__).splitlines()[0]}")
+        else:
+            raise RenderingUnavailable(NO_GL.format(reason="; ".join(reasons) or "MUJOCO_GL forbids it"))
+        self._size = mujoco.MjrRect(0, 0, width, height)
+
+    def _open(self, backend: str, model: mujoco.MjModel, width: int, height: int) -> None:
+        self._context: Any = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
+        self._context.make_current()
+        self._painter: Any = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._painter)
+
+    def draw(self, scene: mujoco.MjvScene) -> Image:
+        """Picture (H, W, 3) of a scene."""
+        self._context.make_current()
+        mujoco.mjr_render(self._size, scene, self._painter)
+        picture = np.empty((self._size.height, self._size.width, 3), dtype=np.uint8)
+        mujoco.mjr_readPixels(picture, None, self._size, self._painter)
+        return picture[::-1]  # OpenGL's first row is the lowest
+
+    def close(self) -> None:
+        """Give the graphics memory back."""
+        self._context.make_current()
+        self._painter.free()
+        self._context.free()
+
+
+def backends() -> tuple[str, ...]:
+    """MuJoCo's OpenGL modules worth trying, in order: the user's ``MUJOCO_GL``, else what suits the machine.
+
+    Chosen here and not left to MuJoCo, which reads the variable only once, when it is imported first.
+    """
+    chosen = os.environ.get("MUJOCO_GL", "").lower()
+    if chosen in ("off", "false", "0", "disable", "disabled"):
+        return ()
+    if chosen in ("egl", "osmesa", "glfw", "cgl"):
+        return (chosen,)
+    if not sys.platform.startswith("linux"):
+        return ("cgl", "glfw") if sys.platform == "darwin" else ("glfw",)
+    return ("glfw", "egl", "osmesa") if os.environ.get("DISPLAY") else ("egl", "osmesa")
