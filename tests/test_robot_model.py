@@ -177,6 +177,10 @@ WRONG_DATA = {
     "unknown excluded link": (set_at("collision", "exclude", to=[["body_link", "tail"]]), "'tail'"),
     "unknown version": (set_at("default_version", to="v9"), "no version 'v9'.*standard, heavy"),
     "version of an unknown link": (set_at("versions", "standard", to={"links": {"tail": {"mass": 1}}}), "'tail'"),
+    "version based on itself": (
+        set_at("versions", "standard", to={"base": "standard"}),
+        "'standard'.*one of those before it",
+    ),
     "version of an unknown kind": (set_at("versions", "standard", to={"length": {}}), "'length'.*links, speed"),
     "coupling table out of order": (
         set_at("tables", to=[{"x": "head_pan", "y": "head_tilt", "rows": [[1, -1, 1], [0, -1, 1]]}]),
@@ -211,7 +215,11 @@ WRONG_URDF = {
     "no speed limit": ('velocity="5.0"', 'velocity="0"', "'head_pan'.*velocity"),
     "no mass": ('<mass value="0.95"/>', '<mass value="0"/>', "the base link has no mass"),
     "impossible inertia": ('ixx="0.0028', 'ixx="0.28', "inertia that no body can have"),
-    "sliding joint": ('"head_pan" type="revolute"', '"head_pan" type="prismatic"', "'head_pan' .prismatic.: only fixed"),
+    "sliding joint": (
+        '"head_pan" type="revolute"',
+        '"head_pan" type="prismatic"',
+        "'head_pan' .prismatic.: only fixed",
+    ),
     "one name twice": ('"head_pan"', '"body_link"', "the name 'body_link' twice"),
     "no limit": ('<limit lower="-0.05" upper="2.2" velocity="5.0" effort="5.0"/>', "", "'l_knee' .*with a <limit>"),
     "unknown parent": (

@@ -23,10 +23,15 @@ def changes_of(data: Mapping[str, Any], version: str | None) -> tuple[str, dict[
     versions = data["versions"]
     name = data["default_version"] if version is None else version
     if name not in versions:
-        raise RobotModelError(f"{data['name']} has no version {name!r}: choose one of {', '.join(versions)}")
+        raise RobotModelError(f"{data['name']} has no version {name!r}: choose one of {', '.join(map(str, versions))}")
     own = versions[name] or {}
     changes: dict[str, dict[str, Any]] = {section: {} for section in SECTIONS}
     if "base" in own:
+        earlier = list(versions)[: list(versions).index(name)]
+        if own["base"] not in earlier:
+            raise RobotModelError(
+                f"version {name!r} is based on {own['base']!r}: name one of those before it ({earlier})"
+            )
         changes = changes_of(data, own["base"])[1]
     for section, values in own.items():
         if section not in (*SECTIONS, "base"):
