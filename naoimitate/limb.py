@@ -44,12 +44,14 @@ class Limb(NamedTuple):
 class LimbWeights(NamedTuple):
     """Settings of ``solve_limb``; weights multiply errors in m (or m/rad)."""
 
-    bend: float = 0.06
+    tip: float = 1.0
+    """Of the hand; 0 while the arm changes its branch in joint space."""
+    bend: float = 0.15
     """Of the elbow's place on the human's upper-arm direction: enough to choose a branch, too weak to move the hand."""
     orientation: float = 0.05
     """[m/rad] of the tip's orientation, where one is asked for."""
-    rest: float = 0.002
-    """[m/rad] towards the rest posture."""
+    rest: float = 0.004
+    """[m/rad] towards the rest posture: without it a joint at a singularity runs to its stop for a millimetre."""
     damping: float = 0.004
     """[m/rad], plus half of the error's own length (Sugihara 2011)."""
     tolerance: float = 1e-5
@@ -149,7 +151,7 @@ def solve_limb(
             break
         H, g = np.zeros((n, n)), np.zeros(n)
         point_jacobian(tree, pos, rot, limb.tip_joint, tip, J)
-        _add_rows(J, error, 1.0, limb.joints, H, g)
+        _add_rows(J, error, settings.tip, limb.joints, H, g)
         if bend_weight > 0.0:
             elbow = pos[limb.bend_joint + 1] + rot[limb.bend_joint + 1] @ limb.bend
             point_jacobian(tree, pos, rot, limb.bend_joint, elbow, J)
