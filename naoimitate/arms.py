@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.legs import table_bounds
 from naoimitate.balance.clearance import Clearance
+from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.pose import Pose
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.observer import Observation
-from naoimitate.limb import LimbWeights, build_limb, solve_limb
+from naoimitate.limb import LimbWeights, build_limb, solve_limb, solve_limb_fixed
+from naoimitate.robot.kernel import forward
 from naoimitate.robot.model import RobotModel
 
 Array = npt.NDArray[np.float64]
@@ -29,11 +33,15 @@ BRANCH_SPEED = 0.6
 BRANCH_NEAR = 0.1
 """[rad] from the other posture at which the hand is followed again."""
 
+SETTLE_STEP = 0.1
+"""[rad] of each joint in one step of ``settle``."""
+
 
 class Arms:
     """Both arms and the head of a robot."""
 
-    def __init__(self, robot: RobotModel, weights: LimbWeights, reserve: float, orientation: str) -> None:
+    def __init__(self, robot: RobotModel, weights: LimbWeights, reserve: float, orientation: str, paper: PaperIk | None) -> None:
+        self._paper = paper
         self._robot, self._weights, self._orientation = robot, weights, orientation
         self._limbs = [build_limb(robot, f"{s}_arm", reserve) for s in "lr"]
         self._no_rows = [(np.zeros((0, len(limb.joints))), np.zeros(0)) for limb in self._limbs]
@@ -57,11 +65,33 @@ class Arms:
             pose.link_pos[limb.tip_joint + 1] + pose.link_rot[limb.tip_joint + 1] @ limb.tip - limb.root for limb in self._limbs
         ])
 
+    def touches(self, side: int, clearance: Clearance) -> bool:
+        """Whether an arm is kept from moving on by the body or the floor, in the pose last looked at."""
+        return clearance.touching(self._limbs[side].joints)
+
+    def settle(self, pose: Pose, targets: Array, seen: Observation, clearance: Clearance, steps: int) -> Array:
+        """Joint angles (J,) with arms and head at their targets, found without speed limits (frame 0)."""
+        clearance.look(pose)
+        for _ in range(steps):
+            low, high = pose.q - SETTLE_STEP, pose.q + SETTLE_STEP
+            q, _ = self.solve(pose, targets, seen, low, high, clearance)
+            self.head(q, seen.head, SETTLE_STEP, low, high)
+            link_pos, link_rot = pose.link_pos.copy(), pose.link_rot.copy()
+            forward(self._robot.tree, q, link_pos, link_rot)
+            pose = replace(pose, q=q, link_pos=link_pos, link_rot=link_rot)
+            clearance.look(pose)
+        return pose.q
+
     def solve(self, pose: Pose, targets: Array, seen: Observation, low: Array, high: Array, clearance: Clearance) -> tuple[Array, int]:
         """Joint angles (J,) with both arms moved towards targets (2, 3) m, and the iterations it took."""
         q, iterations = pose.q.copy(), 0
         self._frames += 1
         for side, limb in enumerate(self._limbs):
+            if self._paper is not None:
+                solve_limb_fixed(self._robot.tree, limb, targets[side], q, self._paper.damping, self._paper.arm_iterations)
+                q[limb.joints] = np.clip(q[limb.joints], low[limb.joints], high[limb.joints])
+                iterations += self._paper.arm_iterations
+                continue
             task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
             rows = clearance.limb_rows(pose, limb.joints)
             if self._branch[side] is not None:

@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from naoimitate.balance.clearance import Clearance
 from naoimitate.balance.legs import Legs, table_bounds
+from naoimitate.balance.pose import Pose
 from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.robot.model import RobotModel
 
@@ -111,3 +113,51 @@ def outline_travel(legs: Legs, side: int, pos_a: Array, rot_a: Array, pos_b: Arr
             squared += d * d
         worst = max(worst, np.sqrt(squared))
     return worst
+
+
+class Gate:
+    """Refuses poses: out of range, too fast, off their planted soles, touching, or without margin."""
+
+    def __init__(self, robot: RobotModel, legs: Legs, clearance: Clearance, limits: GateLimits) -> None:
+        self._model, self._legs, self._clearance, self._limits = build_gate(robot), legs, clearance, limits
+
+    def passes(self, pose: Pose, before: Pose, stances: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float) -> bool:
+        """Whether a pose may follow another one after dt s.
+
+        stances: which feet carry, left and right, where ``planted_pos`` (2, 3) m and ``planted_rot`` (2, 3, 3) say.
+        A pose that is no worse than the one before passes clearance and margin, so that a way out stays open.
+        """
+        return (
+            self.moves(pose, before, stances, planted_pos, planted_rot, dt)
+            and self._clear(pose, before)
+            and self.balanced(pose, before, stances)
+        )
+
+    def moves(self, pose: Pose, before: Pose, fixed: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float) -> bool:
+        """Whether ranges and speeds hold, and the ``fixed`` soles stay where they are planted."""
+        limits = self._limits
+        if range_excess(self._model, pose.q) > 0.0 or speed_ratio(self._model, pose.q, before.q, dt) > limits.speed_share:
+            return False
+        return not any(
+            fixed[side]
+            and outline_travel(self._legs, side, pose.sole_pos[side], pose.sole_rot[side], planted_pos[side], planted_rot[side])
+            > limits.slip
+            for side in (0, 1)
+        )
+
+    def _clear(self, pose: Pose, before: Pose) -> bool:
+        self._clearance.look(pose)
+        nearest = self._clearance.nearest
+        if nearest >= -self._limits.overlap:
+            return True
+        self._clearance.look(before)
+        return nearest >= self._clearance.nearest
+
+    def balanced(self, pose: Pose, before: Pose, stances: tuple[bool, bool]) -> bool:
+        """Whether the static margin is kept, or at least not made worse."""
+        margin = self.margin(pose, stances)
+        return margin >= self._limits.margin or margin >= self.margin(before, stances)
+
+    def margin(self, pose: Pose, stances: tuple[bool, bool]) -> float:
+        """Static margin of a pose on its stance feet, m."""
+        return float(support_margin(self._legs, pose.sole_pos, pose.sole_rot, *stances, pose.com))

@@ -28,6 +28,8 @@ class TaskLimits:
     """[rad/s]."""
     joint_share: float = 0.85
     """Share of the motors' no-load speed that a joint may use."""
+    min_dt: float = 1e-4
+    """[s], for frames that come at once."""
     max_dt: float = 0.05
     """[s] of elapsed time that a single step may use up, however late it comes."""
 

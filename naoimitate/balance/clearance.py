@@ -55,6 +55,13 @@ class Clearance:
         floor = float(self._lowest[self._not_foot, 2].min()) if self._not_foot.any() else np.inf
         return min(float(self._d.min()) if len(self._d) else np.inf, floor)
 
+    def touching(self, joints: Ints) -> bool:
+        """Whether a link of these joints is as near to another shape or the floor as it may come."""
+        mine = np.isin(self._shapes.link - 1, joints)
+        pairs = mine[self._pairs].any(axis=1) if len(self._pairs) else np.zeros(0, dtype=bool)
+        close = self._settings.safe + self._settings.push
+        return bool((self._d[pairs] < close).any() or (self._lowest[mine, 2] < close).any())
+
     def limb_rows(self, pose: Pose, joints: Ints) -> tuple[Array, Array]:
         """Rows (C, n) and bounds (C,) m for a limb whose joints (n,) move while the base stays."""
         return _limb_rows(

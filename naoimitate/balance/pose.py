@@ -1,4 +1,4 @@
-"""A whole-body pose of the robot in the world, with what is derived from it."""
+"""Whole-body poses of a robot in the world, hung on one of its soles."""
 
 from __future__ import annotations
 
@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.balance.legs import POSE, Legs, Stance, base_pose
+from naoimitate.balance.offset import normalised_offset
+from naoimitate.robot.kernel import center_of_mass, forward
+from naoimitate.robot.model import RobotModel
+
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Pose:
-    """A whole-body pose of the robot in the world, with what is derived from it.
+    """A pose and what is derived from it.
 
     q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m, world. sole_pos: (2, 3) m, sole_rot: (2, 3, 3), world.
     link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them.
@@ -26,3 +31,46 @@ class Pose:
     sole_rot: Array
     link_pos: Array
     link_rot: Array
+
+    @property
+    def soles_in_base(self) -> Array:
+        """Positions of the soles in the torso frame, (2, 3) m."""
+        return np.asarray((self.sole_pos - self.base_pos) @ self.base_rot)
+
+
+class PoseMaker:
+    """Forward kinematics of one robot, from joint angles to poses."""
+
+    def __init__(self, robot: RobotModel, legs: Legs) -> None:
+        self._robot, self._legs = robot, legs
+
+    def hang(self, q: Array, side: int, sole_pos: Array, sole_rot: Array) -> Pose:
+        """The pose at q (J,) rad whose sole ``side`` is row ``side`` of poses (2, 3) m, (2, 3, 3) in the world."""
+        n = len(q)
+        link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
+        forward(self._robot.tree, q, link_pos, link_rot)
+        R, p, com = np.empty((3, 3)), np.empty(3), np.empty(3)
+        base_pose(self._robot.tree, self._legs, Stance(side, sole_pos, sole_rot, POSE, 0.0), link_pos, link_rot, R, p)
+        center_of_mass(self._robot.tree, link_pos, link_rot, com)
+        rows = self._legs.sole_joint + 1
+        soles = link_pos[rows] + np.einsum("kij,kj->ki", link_rot[rows], self._legs.sole_point)
+        return Pose(q, R, p, p + R @ com, p + soles @ R.T, R @ link_rot[rows], link_pos, link_rot)
+
+    def stand(self, q: Array) -> Pose:
+        """The pose at q (J,) rad with the right sole flat at the origin of the floor."""
+        return self.hang(q, 1, np.zeros((2, 3)), np.stack([np.eye(3), np.eye(3)]))
+
+    def centres(self, sole_pos: Array, sole_rot: Array) -> Array:
+        """Centroids of the sole outlines in the world, (2, 3) m: the foot centres of (6)."""
+        c = self._legs.centre
+        return np.asarray(sole_pos + sole_rot[:, :, 0] * c[:, :1] + sole_rot[:, :, 1] * c[:, 1:])
+
+    def lowest(self, pose: Pose) -> float:
+        """Height of the lowest point of both sole outlines, m."""
+        heights = pose.sole_pos[:, 2, None] + np.einsum("kni,ki->kn", self._legs.outline, pose.sole_rot[:, 2, :2])
+        return float(heights.min())
+
+    def offset(self, pose: Pose, last: float = 0.5) -> float:
+        """Equation (6) for a pose; ``last`` where the feet are too close."""
+        left, right = self.centres(pose.sole_pos, pose.sole_rot)
+        return normalised_offset(pose.com, left, right, last)

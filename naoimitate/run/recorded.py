@@ -11,11 +11,12 @@ import numpy as np
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Motion, RobotCommand
-from naoimitate.imitator import Imitator, Settings
+from naoimitate.imitator import Imitator
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.file import Run
 from naoimitate.run.pace import AutoPace, ConstantPace
 from naoimitate.run.provenance import provenance
+from naoimitate.settings import Settings
 
 LONGEST = 40.0
 """A run is ended after this many times the length of the clip, plus a minute: nothing waits for ever."""

@@ -1,0 +1,124 @@
+"""Retargeting on planted soles: the default (section V-C on feet that do not slide)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.balance.clearance import Clearance
+from naoimitate.balance.legs import FREE, POSE, LegGoal, Legs, LegWeights, Stance, solve_legs
+from naoimitate.balance.pose import Pose, PoseMaker
+from naoimitate.balance.retarget import Answer, Footing, Reach
+from naoimitate.balance.stride import Plan, Stride
+from naoimitate.core.frames import GivenUp
+from naoimitate.core.geometry import (
+    heading,
+    matrix_from_rotation_vector,
+    rotation_vector,
+    wrap,
+    yaw_matrix,
+)
+from naoimitate.fsm import Mode
+from naoimitate.gate import Gate
+from naoimitate.robot.model import RobotModel
+
+Array = npt.NDArray[np.float64]
+
+SCALES = (1.0, 0.5, 0.2)
+"""Parts of a step that are tried, in this order, before the pose is held."""
+CLOSED = 2e-5
+"""Sum of m and rad by which a planted sole may differ from where it stands after a solve."""
+PLACE_STEPS = 150
+PLACE_STEP = 0.1
+"""[rad] of each joint in one step of ``place``."""
+LEVEL_BELOW = 0.05
+"""[m] of height below which a swinging sole is levelled more and more."""
+LEVEL_GAIN = 4.0
+
+
+class Planted:
+    """Soles fixed in the world; the torso moves over them."""
+
+    def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, stride: Stride, weights: LegWeights, clearance: Clearance, gate: Gate) -> None:
+        self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
+        self._weights, self._clearance, self._gate = weights, clearance, gate
+
+    @property
+    def mode(self) -> Mode:
+        """The robot's support mode."""
+        return self._stride.mode
+
+    @property
+    def offset(self) -> float:
+        """The robot's normalised offset, 0 left to 1 right."""
+        return self._stride.offset
+
+    def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
+        """The next pose: the whole step, a part of it, or none, whatever passes the gate first."""
+        stride = self._stride
+        plan = stride.plan(pose, footing, reach.dt)
+        stances = (stride.mode.stance != "R", stride.mode.stance != "L")
+        given_up = GivenUp.LANDING if plan.clipped else GivenUp(0)
+        iterations = 0
+        for scale in SCALES:
+            q = pose.q + scale * (q_arms - pose.q)
+            done, closed = self._solve(q, plan, pose, feet, scale, reach)
+            iterations += done
+            candidate = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
+            if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
+                stride.accept(plan, scale)
+                return Answer(candidate, given_up, iterations)
+        stride.hold()
+        return Answer(pose, given_up | GivenUp.HOLD, iterations)
+
+    def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
+        """Move the legs of q (J,) to ``scale`` of the plan; (iterations, whether the other sole is where it was asked to be)."""
+        stride, other = self._stride, 1 - self._stride.side
+        pos, rot = stride.planted_pos.copy(), stride.planted_rot.copy()
+        pos[other], rot[other] = plan.sole_pos, plan.sole_rot
+        if plan.kind == POSE and scale < 1.0:
+            start, turn = pose.sole_pos[other], rotation_vector(plan.sole_rot @ pose.sole_rot[other].T)
+            pos[other] = start + scale * (plan.sole_pos - start)
+            rot[other] = matrix_from_rotation_vector(scale * turn) @ pose.sole_rot[other]
+        weights, foot_weight = self._weights, np.ones(2)
+        if plan.kind == FREE:
+            near = max(0.0, 1.0 - max(pose.sole_pos[other][2], 0.0) / LEVEL_BELOW)
+            weights = weights._replace(level=weights.level * (1.0 + LEVEL_GAIN * near))
+        elif stride.swinging:
+            foot_weight[other] = 0.0
+        offset = stride.offset + scale * (plan.offset - stride.offset)
+        goal = LegGoal(feet, stride.com_goal(offset), foot_weight)
+        lowest = plan.min_height if scale == 1.0 else 0.0
+        stance = Stance(stride.side, pos, rot, plan.kind, lowest)
+        moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
+        self._clearance.look(moved)
+        rows = self._clearance.leg_rows(moved, self._legs, stride.side)
+        done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, goal, q, reach.low, reach.high, *rows)
+        return done, plan.kind == FREE or closure < CLOSED
+
+    def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
+        """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
+
+        q: (J,) rad, a standing posture with the arms where they belong. feet: (2, 3) m, targets (5). The left sole is
+        walked to its place in the landing set without speed limits; where that fails the robot keeps what it reached.
+        """
+        stride, pose = self._stride, self._maker.stand(q)
+        flat = np.stack([np.eye(3), np.eye(3)])
+        offset = {"L": 0.0, "R": 1.0}.get(footing.support, min(max(footing.offset, 0.0), 1.0))
+        start = pose.sole_pos * [1.0, 1.0, 0.0]
+        stride.restart(start, flat, offset)
+        place, turn, _ = stride.landing.clip(0, *footing.landing[0])
+        goal = start[1] + [place[0], place[1], 0.0]
+        for k in range(PLACE_STEPS):
+            part = min(1.0, 2.0 * (k + 1) / PLACE_STEPS)
+            position, rotation = start[0] + part * (goal - start[0]), yaw_matrix(part * turn)
+            reach = Reach(0.0, pose.q - PLACE_STEP, pose.q + PLACE_STEP)
+            q = pose.q.copy()
+            _, closed = self._solve(q, Plan(offset, 0.0, position, rotation, POSE), pose, feet, 1.0, reach)
+            if closed:
+                stride.planted_pos[0], stride.planted_rot[0] = position, rotation
+                pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
+        middle = heading(rotation) * 0.5
+        R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
+        stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
+        return self._maker.hang(pose.q, 1, stride.planted_pos, stride.planted_rot)

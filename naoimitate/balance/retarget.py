@@ -1,0 +1,68 @@
+"""What every way of retargeting the feet has in common: the request of a frame, and the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.balance.pose import Pose
+from naoimitate.core.frames import GivenUp
+from naoimitate.fsm import Mode
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Footing:
+    """What the human's feet ask for.
+
+    support: ``D``, ``L``, ``R`` or ``F``. offset: the human's, (6). landing: for a left and a right swing foot, its
+    wished position (2,) m and yaw (rad) in the stance sole's frame. torso: (3, 3) world from the human's torso.
+    ahead, may_lift: as in ``SupportInput``.
+    """
+
+    support: str
+    offset: float
+    landing: tuple[tuple[Array, float], tuple[Array, float]]
+    torso: Array
+    ahead: str = ""
+    may_lift: bool = True
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What a frame's time allows: dt in s; low, high: (J,) rad, the joint angles within the speed limits."""
+
+    dt: float
+    low: Array
+    high: Array
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The pose that was found, what it gave up, and the solver's iterations."""
+
+    pose: Pose
+    given_up: GivenUp
+    iterations: int
+
+
+class Retargeting(Protocol):
+    """A way of placing the feet: ``planted``, ``paper`` or ``direct``."""
+
+    @property
+    def mode(self) -> Mode:
+        """The robot's support mode."""
+
+    @property
+    def offset(self) -> float:
+        """The robot's normalised offset, 0 left to 1 right."""
+
+    def place(self, q: Array, footing: Footing) -> Pose:
+        """Stand in double support as near to the footing as the landing set allows, starting from q (J,) rad."""
+
+    def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
+        """The next pose: arms and head from q_arms (J,) rad, feet (2, 3) m the targets (5) of the soles."""

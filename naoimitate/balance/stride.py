@@ -1,0 +1,136 @@
+"""What one frame asks of the feet: support mode, offset and swing foot, advanced together (section V-A and V-B)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from naoimitate.balance.landing import LandingSet
+from naoimitate.balance.legs import FREE, POSE
+from naoimitate.balance.offset import OffsetLaw, advance
+from naoimitate.balance.pose import Pose, PoseMaker
+from naoimitate.balance.retarget import Footing
+from naoimitate.balance.swing import Swing, SwingSettings
+from naoimitate.core.geometry import heading, wrap, yaw_matrix
+from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What one frame asks of the legs.
+
+    offset, offset_speed: the normalised offset to reach and its speed, 1/s. sole_pos (3,), sole_rot (3, 3): pose of the
+    sole on which the base does not hang. kind, min_height: as in ``legs.Stance``. touchdown: the step ends with the
+    foot on the floor. clipped: the landing place is not the human's.
+    """
+
+    offset: float
+    offset_speed: float
+    sole_pos: Array
+    sole_rot: Array
+    kind: int
+    min_height: float = 0.0
+    touchdown: bool = False
+    clipped: bool = False
+
+
+class Stride:
+    """The support machine with the offset and the swing foot that belong to it, on planted soles."""
+
+    def __init__(self, maker: PoseMaker, landing: LandingSet, law: OffsetLaw, swing: SwingSettings) -> None:
+        self._maker, self.landing, self._law, self._swing_settings = maker, landing, law, swing
+        self.restart(np.zeros((2, 3)), np.stack([np.eye(3), np.eye(3)]), 0.5)
+
+    def restart(self, planted_pos: Array, planted_rot: Array, offset: float) -> None:
+        """Stand in double support on soles at (2, 3) m, (2, 3, 3) in the world with a normalised offset."""
+        self._fsm = SupportFsm()
+        self.planted_pos, self.planted_rot = planted_pos.copy(), planted_rot.copy()
+        self.offset, self._offset_speed = offset, 0.0
+        self.side = 1
+        self._swing: Swing | None = None
+        self._landed = False
+
+    @property
+    def mode(self) -> Mode:
+        """The robot's support mode."""
+        return self._fsm.mode
+
+    @property
+    def swinging(self) -> bool:
+        """Whether one foot does not carry."""
+        return self.mode is not Mode.DOUBLE
+
+    def plan(self, pose: Pose, footing: Footing, dt: float) -> Plan:
+        """Advance the support machine, the offset and the swing foot by dt s from the present pose."""
+        before = self.mode
+        given = SupportInput(
+            human=footing.support,
+            offset=self.offset,
+            landed=self._landed,
+            stance_ok=(True, True) if self.swinging else self._stance_ok(),
+            ahead=footing.ahead,
+            may_lift=footing.may_lift,
+        )
+        if self._fsm.step(given) is not before:
+            self._changed(before)
+        target = offset_target(self.mode, given, footing.offset)
+        left, right = self._maker.centres(self.planted_pos, self.planted_rot)
+        limit = self._law.acceleration(float(np.hypot(*(right - left)[:2])), float(pose.com[2]))
+        offset, speed = advance(self.offset, self._offset_speed, target, dt, self._law, limit)
+        if self._swing is None:
+            other = 1 - self.side
+            return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE)
+        return self._swing_plan(self._swing, pose, footing, (offset, speed), dt)
+
+    def _swing_plan(self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float], dt: float) -> Plan:
+        foot = 1 - self.side
+        stance_yaw = heading(self.planted_rot[self.side])
+        place, turn, clipped = self.landing.clip(foot, *footing.landing[foot])
+        goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
+        position, rotation, down = swing.step(
+            pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
+        )
+        kind = POSE if swing.fixed_pose else FREE
+        return Plan(*offset, position, rotation, kind, swing.min_height, down, clipped and self.mode.landing)
+
+    def accept(self, plan: Plan, scale: float) -> None:
+        """``scale`` of the way to the plan was taken."""
+        self.offset += scale * (plan.offset - self.offset)
+        self._offset_speed = plan.offset_speed if scale == 1.0 else 0.0
+        if plan.touchdown and scale == 1.0:
+            foot = 1 - self.side
+            self.planted_pos[foot], self.planted_rot[foot] = plan.sole_pos, plan.sole_rot
+            self._landed = True
+
+    def hold(self) -> None:
+        """The plan was not taken: offset and swing start again from rest."""
+        self._offset_speed = 0.0
+        if self._swing is not None:
+            self._swing.stop()
+
+    def com_goal(self, offset: float) -> Array:
+        """Where the CoM's projection belongs, (2,) m: p_L + o (p_R - p_L), or over the stance foot's centre."""
+        left, right = self._maker.centres(self.planted_pos, self.planted_rot)
+        if self.swinging:
+            offset = float(self.side)
+        return np.asarray((left + offset * (right - left))[:2])
+
+    def _changed(self, before: Mode) -> None:
+        if not self.swinging:
+            self._swing, self._landed = None, False
+        elif before is Mode.DOUBLE:
+            self.side = 0 if self.mode.stance == "L" else 1
+            foot = 1 - self.side
+            self._swing = Swing(self.planted_pos[foot], self.planted_rot[foot], self._swing_settings)
+            self._landed = False
+
+    def _stance_ok(self) -> tuple[bool, bool]:
+        """Whether the CoM can come over the left and the right foot with the soles where they are."""
+        yaw = heading(self.planted_rot[1])
+        relative = yaw_matrix(-yaw)[:2, :2] @ (self.planted_pos[0] - self.planted_pos[1])[:2]
+        good = self.landing.contains(0, relative, wrap(heading(self.planted_rot[0]) - yaw))
+        return (True, True) if good else (self.offset < 0.5, self.offset >= 0.5)
