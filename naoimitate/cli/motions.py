@@ -15,7 +15,10 @@ if TYPE_CHECKING:
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="A JSON list: name, duration, single_support [[side, from, to]].")
 def motions(as_json: bool) -> None:
-    """List the built-in motions; use them as builtin:NAME wherever a command takes a MOTION."""
+    """List the built-in motions.
+
+    Use them as builtin:NAME wherever a command takes a MOTION.
+    """
     from naoimitate.motion.builtin import builtin_motion, builtin_names
 
     loaded = {name: builtin_motion(name) for name in builtin_names()}

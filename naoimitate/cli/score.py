@@ -18,7 +18,10 @@ MISSED = 1
 @click.option("--robot", metavar="FOLDER", help="Folder of the run's robot, when it is not a built-in one.")
 @click.pass_context
 def score(context: click.Context, run_file: Path, as_json: bool, check: bool, robot: str | None) -> None:
-    """Measure RUN.npz: one line per measure, with its bar and whether it is met."""
+    """Measure a run.
+
+    One line per measure of RUN.npz, with its bar and whether it is met.
+    """
     from naoimitate.robot import load_robot
     from naoimitate.run.file import load_run
     from naoimitate.run.scores import score_run

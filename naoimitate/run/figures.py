@@ -8,6 +8,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,8 +27,8 @@ COLOURS = {"D": "#9aa5b1", "L": "#2f6fb0", "R": "#d9822b", "F": "#c0392b"}
 MODE_NAMES = {"D": "double", "L": "left", "R": "right", "F": "flight"}
 HUMAN, ROBOT, BAR = "#555555", "#2f6fb0", "#c0392b"
 LEFT, RIGHT = COLOURS["L"], COLOURS["R"]
-WIDTH = 9.0
-"""Width of every figure, inch."""
+WIDTH, LEFT_EDGE, RIGHT_EDGE, BOTTOM, TOP = 9.0, 0.85, 0.15, 0.5, 0.3
+"""Width of every figure and its margins, inch: the same for all, so that their time axes lie above each other."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ def draw_support(axes: Axes, subject: Subject) -> None:
             axes.broken_barh([(a, b - a) for a, b in spans], (row - 0.4, 0.8), facecolors=colour)
     axes.set_yticks([0, 1], ["robot", "person"])
     handles = [axes.plot([], [], lw=8, color=colour, label=MODE_NAMES[mode])[0] for mode, colour in COLOURS.items()]
-    axes.legend(handles=handles, ncol=4, loc="upper center", bbox_to_anchor=(0.5, 1.3), frameon=False)
+    legend(axes, handles=handles)
 
 
 def draw_offset(axes: Axes, subject: Subject) -> None:
@@ -68,7 +69,7 @@ def draw_offset(axes: Axes, subject: Subject) -> None:
     axes.plot(run.time, run.offset, color=ROBOT, label="robot")
     axes.set(ylabel="offset", ylim=(-0.05, 1.05))
     axes.set_yticks([0, 0.5, 1], ["left 0", "0.5", "right 1"])
-    axes.legend(ncol=2)
+    legend(axes)
 
 
 def draw_hands(axes: Axes, subject: Subject) -> None:
@@ -87,7 +88,7 @@ def draw_margin(axes: Axes, subject: Subject) -> None:
     axes.axhline(MIN_MARGIN, color=BAR, lw=1, label="least allowed")
     axes.axhline(PLANNED_MARGIN, color=BAR, lw=1, ls=":", label="planned on one foot")
     axes.set(ylabel="margin, mm")
-    axes.legend(ncol=2)
+    legend(axes)
 
 
 def draw_speed(axes: Axes, subject: Subject) -> None:
@@ -99,7 +100,7 @@ def draw_speed(axes: Axes, subject: Subject) -> None:
             axes.plot(run.time[1:], ratios[:, list(joints)].max(axis=1), lw=1, label=name)
     axes.axhline(SPEED_FRACTION, color=BAR, lw=1)
     axes.set(ylabel="speed / no-load", ylim=(0.0, None))
-    axes.legend(ncol=5)
+    legend(axes)
 
 
 def draw_time_law(axes: Axes, subject: Subject) -> None:
@@ -132,8 +133,9 @@ FIGURES = (
 
 def draw(figure: RunFigure, run: Run, robot: RobotModel) -> Figure:
     """One figure of a run as a matplotlib figure."""
-    canvas = Figure(figsize=(WIDTH, figure.height), layout="constrained")
-    axes = canvas.subplots()
+    canvas = Figure(figsize=(WIDTH, figure.height))
+    across, up = WIDTH - LEFT_EDGE - RIGHT_EDGE, figure.height - BOTTOM - TOP
+    axes = canvas.add_axes((LEFT_EDGE / WIDTH, BOTTOM / figure.height, across / WIDTH, up / figure.height))
     figure.draw(axes, Subject(run, robot, frames(run, robot)))
     axes.set(xlabel="time of the robot, s", xlim=(run.time[0], max(run.time[-1], run.time[0] + 1e-3)))
     axes.spines[["top", "right"]].set_visible(False)
@@ -147,10 +149,15 @@ def as_png(figure: Figure, dpi: int = 110) -> bytes:
     return buffer.getvalue()
 
 
+def legend(axes: Axes, **options: Any) -> None:
+    """A legend in one line above the axes, where it hides nothing."""
+    axes.legend(ncol=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, frameon=False, **options)
+
+
 def _draw_errors(axes: Axes, subject: Subject, columns: tuple[int, int]) -> None:
     error = 100.0 * errors(subject.run, subject.frames)
     for column, label, colour in zip(columns, ("left", "right"), (LEFT, RIGHT), strict=True):
         mean = np.nanmean(error[:, column]) if not np.all(np.isnan(error[:, column])) else np.nan
         axes.plot(subject.run.time, error[:, column], color=colour, label=f"{label}, mean {mean:.2f} cm")
     axes.set(ylabel="error, cm", ylim=(0.0, None))
-    axes.legend(ncol=2)
+    legend(axes)

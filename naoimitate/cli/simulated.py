@@ -1,0 +1,52 @@
+"""A run on the servos of the simulated robot, and its pictures: what joins the rooms ``run`` and ``sim``."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from naoimitate.core.frames import Motion
+    from naoimitate.robot.model import RobotModel
+    from naoimitate.run.file import Run
+
+
+def simulated(run: Run, robot: RobotModel) -> Run:
+    """The run with what the simulated robot made of it."""
+    from naoimitate.sim.simulate import simulate
+
+    result = simulate(robot, run.time, run.q, run.base_pos, run.base_quat, run.support)
+    return dataclasses.replace(
+        run,
+        sim_base_pos=result.base_pos,
+        sim_base_quat=result.base_quat,
+        sim_q=result.q,
+        sim_fell=not result.survived,
+    )
+
+
+def write_pictures(
+    run: Run, robot: RobotModel, motion: Motion, *, video: Path | None, strip: Path | None
+) -> list[Path]:
+    """Write video and picture strip, person and robot at equal times: as it moved where the run was simulated.
+
+    Returns what was written. Without off-screen OpenGL nothing is, and a message on standard error says why.
+    """
+    from naoimitate.core.errors import RenderingUnavailable
+    from naoimitate.sim.render import render_strip, render_video
+
+    moved = (run.sim_q, run.sim_base_pos, run.sim_base_quat)
+    q, base_pos, base_quat = (run.q, run.base_pos, run.base_quat) if run.sim_q is None else moved
+    written = []
+    for render, path in ((render_strip, strip), (render_video, video)):
+        if path is not None:
+            try:
+                render(robot, run.time, q, base_pos, base_quat, path, human=motion, human_time=run.human_time)
+            except RenderingUnavailable as error:
+                click.echo(f"no pictures: {error}", err=True)
+                break
+            written.append(path)
+    return written

@@ -1,0 +1,103 @@
+"""The evaluation of Koenemann, Burget, Bennewitz 2014, once more: Figures 7, 8, 9 and Table I, and the direct baseline.
+
+The paper repeats its complex single-support sequence ten times and times a sequence of 1000 frames of stepping and
+reaching. Ours are the built-in motions ``paper`` and ``step-and-reach``, seen at 30 frames a second by a suit with
+sensor noise, with the paper's parameters and with ours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from naoimitate.core.frames import Array, Motion
+from naoimitate.robot.model import RobotModel
+from naoimitate.run.file import Run
+from naoimitate.run.recorded import imitate
+from naoimitate.run.replay import frames
+from naoimitate.run.similarity import FEET, HANDS, errors
+from naoimitate.run.stability import margins_at_frames
+from naoimitate.settings import PAPER, Settings
+
+MOTIONS = ("paper", "step-and-reach")
+REPETITIONS = 10
+CAMERA_RATE = 30.0
+"""Frames a second at which the person is seen, Hz (the paper's section VI-C)."""
+NOISE = 0.002
+"""Standard deviation of every landmark's coordinates, m: inertial suits publish a few mm; no figure in the paper."""
+NOISE_TIME = 0.1
+"""The noise is smooth over this time, s: a suit's posture comes from a filter and does not jump."""
+PARAMETER_SETS = {"paper": PAPER, "ours": Settings()}
+PAPER_ERRORS_CM = {"hands": 1.4, "feet": 1.6}
+"""Mean errors over ten repetitions of the complex sequence (the paper's section VI-A), cm."""
+
+Progress = Callable[[float], None]
+Simulate = Callable[[Run], Run]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One motion with one set of parameters: the runs of all repetitions and what they show.
+
+    hand_errors, foot_errors: (repetitions,) mean of a run, cm. least_margin: mm over all runs. fell: of each simulated
+    run; empty without simulation.
+    """
+
+    motion: str
+    parameters: str
+    runs: tuple[Run, ...]
+    hand_errors: Array
+    foot_errors: Array
+    least_margin: float
+    fell: tuple[bool, ...]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The direct imitation without stabilisation. outside: share of frames with the centre of mass outside the soles.
+    fell: in simulation, None without one."""
+
+    motion: str
+    run: Run
+    outside: float
+    fell: bool | None
+
+
+def noisy(motion: Motion, seed: int) -> Motion:
+    """The motion as a noisy suit sees it: smooth Gaussian noise of ``NOISE`` on every coordinate of every landmark."""
+    white = np.random.default_rng(seed).normal(size=motion.landmarks.shape)
+    smooth = gaussian_filter1d(white, NOISE_TIME * motion.rate, axis=0, mode="nearest")
+    return replace(motion, landmarks=motion.landmarks + NOISE * smooth / smooth.std())
+
+
+def repeat(
+    motion: Motion, robot: RobotModel, parameters: str, repetitions: int, simulate: Simulate | None, progress: Progress
+) -> Case:
+    """All repetitions of one motion with one set of parameters; seeds 0, 1, 2..."""
+    runs = []
+    for seed in range(repetitions):
+        run = imitate(noisy(motion, seed), robot, PARAMETER_SETS[parameters], sample=CAMERA_RATE, seed=seed)
+        runs.append(run if simulate is None else simulate(run))
+        progress((seed + 1) / repetitions)
+    poses = [frames(run, robot) for run in runs]
+    error = [100.0 * errors(run, pose) for run, pose in zip(runs, poses, strict=True)]
+    return Case(
+        motion=motion.name,
+        parameters=parameters,
+        runs=tuple(runs),
+        hand_errors=np.array([e[:, HANDS].mean() for e in error]),
+        foot_errors=np.array([e[:, FEET].mean() for e in error]),
+        least_margin=1000.0 * min(float(margins_at_frames(r, p).min()) for r, p in zip(runs, poses, strict=True)),
+        fell=tuple(bool(run.sim_fell) for run in runs if run.sim_fell is not None),
+    )
+
+
+def direct_baseline(motion: Motion, robot: RobotModel, simulate: Simulate | None) -> Baseline:
+    """The motion imitated without stabilisation, with the paper's parameters, and played in physics."""
+    run = imitate(noisy(motion, 0), robot, replace(PAPER, retarget="direct"), sample=CAMERA_RATE)
+    outside = float((margins_at_frames(run, frames(run, robot)) < 0.0).mean())
+    run = run if simulate is None else simulate(run)
+    return Baseline(motion.name, run, outside, run.sim_fell)
