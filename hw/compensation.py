@@ -30,7 +30,7 @@ class GravityCompensation:
         self._com = np.zeros(3)
         self._moment, self._torque = np.zeros((joints, 4)), np.zeros(joints)
         self._feet = np.array([robot.points[f"{side}_sole"].joint for side in SIDES])
-        self._sole_offset = np.array([_sole_centre(robot, side) for side in SIDES])
+        self.sole_offset = np.array([_sole_centre(robot, side) for side in SIDES])
         self._sole = np.zeros((2, 3))
 
     def torque(self, q: Array, base_quat: Array, support: str) -> Array:
@@ -45,7 +45,7 @@ class GravityCompensation:
         forward(robot.tree, q, self._pos, self._rot)
         center_of_mass(robot.tree, self._pos, self._rot, self._com)
         for side, foot in enumerate(self._feet):
-            self._sole[side] = self._pos[foot + 1] + self._rot[foot + 1] @ self._sole_offset[side]
+            self._sole[side] = self._pos[foot + 1] + self._rot[foot + 1] @ self.sole_offset[side]
         share = share_of_weight(self._com, self._sole, up, support)
         _stance_torque(
             robot.tree, self._pos, self._rot, self._com, up, self._feet, self._sole, share, self._moment, self._torque

@@ -42,12 +42,12 @@ class MujocoDriver:
         compensation: bool = True,
         real_time: bool = True,
     ) -> None:
-        self._robot, self._settings = robot, settings
+        self._settings = settings
         self._physics = Physics(robot, settings)
         self._compensation = GravityCompensation(robot) if compensation else None
         self._real_time = real_time
         stand = robot.postures["stand"]
-        self._target = _Target(stand, *stand_on_floor(robot, stand), "D")
+        self._stand = self._target = _Target(stand, *stand_on_floor(robot, stand), "D")
         self._halt = threading.Event()
         self._thread: threading.Thread | None = None
         self._place()
@@ -88,7 +88,7 @@ class MujocoDriver:
         return self._state
 
     def _place(self) -> None:
-        target = self._target
+        target = self._target = self._stand
         self._physics.place(target.q, target.base_pos, target.base_quat)
         self._state = self._measure(target)
 

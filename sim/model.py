@@ -60,9 +60,11 @@ def torque_limits(robot: RobotModel, settings: SimSettings) -> Array:
     """Limits (J,) N m of the servos' torque, after ``settings.torque_limit``."""
     if settings.torque_limit == "effort":
         return robot.effort
-    stall = robot.data.get("stall_torque")
-    if stall is None:
-        raise RobotModelError(f"{robot.name} states no stall_torque; simulate it with torque_limit='effort'")
+    stall = robot.data.get("stall_torque") or {}
+    if missing := [name for name in robot.joint_names if name not in stall]:
+        raise RobotModelError(
+            f"{robot.name} states no stall_torque for {missing[0]}; simulate it with torque_limit='effort'"
+        )
     return np.array([stall[name] for name in robot.joint_names])
 
 

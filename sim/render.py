@@ -16,7 +16,7 @@ from naoimitate.sim.gl import Image
 from naoimitate.sim.person import slow_part, stage_person
 from naoimitate.sim.stage import Stage, View
 
-VIDEO_SIZE = (960, 540)
+VIDEO_SIZE = (960, 544)
 PANEL_SIZE = (320, 400)
 """Width and height, pixels."""
 
@@ -52,7 +52,7 @@ def render_video(
         centre = _camera_path(base_pos, time)
         if people is not None:
             centre = centre - np.array([0.0, 0.5 * BESIDE * stage.robot_height])
-        with imageio.get_writer(path, fps=fps, codec="libx264", quality=8, macro_block_size=8) as video:
+        with imageio.get_writer(path, fps=fps, codec="libx264", quality=8) as video:
             for frame in frames:
                 pose = q[frame], base_pos[frame], base_quat[frame]
                 person = None if people is None else people[frame]

@@ -66,6 +66,13 @@ def _split(robot: RobotModel, side: str) -> Array:
 def add_cameras(spec: mujoco.MjSpec, robot: RobotModel) -> None:
     """Add the robot's own cameras: optical axis = the link's x axis pitched down, image upright."""
     for name, camera in robot.data.get("cameras", {}).items():
-        lens = spec.body(camera["link"]).add_camera(name=name, pos=camera["at"], fovy=math.degrees(camera["fov"][1]))
-        pitch = camera["pitch"]
-        lens.alt.xyaxes = [0.0, -1.0, 0.0, math.sin(pitch), 0.0, math.cos(pitch)]
+        quat = np.zeros(4)
+        mujoco.mju_mat2Quat(quat, _looking_along_x(camera["pitch"]).ravel())
+        fovy = math.degrees(camera["fov"][1])
+        spec.body(camera["link"]).add_camera(name=name, pos=camera["at"], quat=quat, fovy=fovy)
+
+
+def _looking_along_x(pitch: float) -> Array:
+    """Axes (3, 3) of a MuJoCo camera (x right, y up, z backwards) that looks along +x, pitched down by rad."""
+    s, c = math.sin(pitch), math.cos(pitch)
+    return np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])

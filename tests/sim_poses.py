@@ -14,9 +14,9 @@ WIDTH = 0.11
 
 
 def one_foot_pose(robot: RobotModel, side: str, lift: float = 0.03, arms: float = 0.0) -> np.ndarray:
-    """Posture (J,) rad on one foot: CoM over the centroid of its sole, torso upright, the other sole beside it at ``lift`` m.
+    """Posture (J,) rad on one foot, torso upright, CoM over the centroid of its sole, the other sole level beside it.
 
-    arms: rad, how far both shoulders' first joints are turned from the stand.
+    lift: m of the other sole. arms: rad, how far both shoulders' first joints are turned from the stand.
     """
     stand = robot.postures["stand"].copy()
     other = "r" if side == "l" else "l"
