@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from naoimitate.core.frames import Motion as Motion
     from naoimitate.core.frames import RobotCommand as RobotCommand
     from naoimitate.imitator import Imitator as Imitator
-    from naoimitate.imitator import Settings as Settings
     from naoimitate.motion import load_motion as load_motion
     from naoimitate.robot.load import load_robot as load_robot
     from naoimitate.robot.model import RobotModel as RobotModel
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from naoimitate.run.file import save as save_run
     from naoimitate.run.recorded import imitate as imitate
     from naoimitate.run.scores import score_run as score_run
+    from naoimitate.settings import Settings as Settings
 
 _HOMES = {
     "HumanFrame": "naoimitate.core.frames:HumanFrame",
@@ -32,7 +32,7 @@ _HOMES = {
     "RobotCommand": "naoimitate.core.frames:RobotCommand",
     "RobotModel": "naoimitate.robot.model:RobotModel",
     "Run": "naoimitate.run.file:Run",
-    "Settings": "naoimitate.imitator:Settings",
+    "Settings": "naoimitate.settings:Settings",
     "imitate": "naoimitate.run.recorded:imitate",
     "load_motion": "naoimitate.motion:load_motion",
     "load_robot": "naoimitate.robot.load:load_robot",

@@ -62,7 +62,7 @@ class Imitator:
         ik = s.paper_ik or PaperIk()
         if s.retarget == "paper":
             return PaperFeet(robot, legs, maker, planted, gate, s.offset, ik, s.limits.foot_speed)
-        return Direct(robot, maker, planted, ik) if s.retarget == "direct" else planted
+        return Direct(robot, legs, maker, planted, ik) if s.retarget == "direct" else planted
 
     def calibrate(self, frame: HumanFrame) -> Subject:
         """Measure a person who stands in a T-pose; raises CalibrationError where the frame cannot serve."""

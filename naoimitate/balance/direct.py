@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.balance.legs import Legs
 from naoimitate.balance.paper import PaperIk, shortened, uncoupled_leg
 from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
@@ -23,8 +24,9 @@ _MODES = {"D": Mode.DOUBLE, "L": Mode.LEFT, "R": Mode.RIGHT}
 class Direct:
     """The feet where the mapping puts them; the torso as the person's; the lower sole on the floor."""
 
-    def __init__(self, robot: RobotModel, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
+    def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
         self._robot, self._maker, self._planted, self._ik = robot, maker, planted, ik
+        self._rows = legs.sole_joint + 1
         self._limbs = [uncoupled_leg(robot, side) for side in "lr"]
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
@@ -47,7 +49,7 @@ class Direct:
     def _upright(self, hung: Pose, before: Pose, side: int, footing: Footing) -> Pose:
         """Turn the robot to the person's torso, keep the stance ankle's place, put the lower sole on the floor."""
         torso = yaw_matrix(-self._yaw) @ footing.torso
-        sole_rot = torso @ hung.base_rot.T @ hung.sole_rot
+        sole_rot = torso @ hung.link_rot[self._rows]
         positions = before.sole_pos.copy()
         pose = self._maker.hang(hung.q, side, positions, sole_rot)
         positions[side][2] -= self._maker.lowest(pose)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from naoimitate.balance.legs import LegLimits, Legs, reduce_columns
+from naoimitate.balance.legs import LegLimits, Legs, reduce_columns, table_bounds
 from naoimitate.balance.offset import OffsetLaw, advance
 from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
@@ -30,6 +30,8 @@ from naoimitate.robot.model import RobotModel, Tree
 
 Array = npt.NDArray[np.float64]
 
+STALLED = 1e-4
+"""[rad] of the largest joint step below which a solve has come as near as it can."""
 TOUCHDOWN = 0.002
 """[m] above the stance sole's plane at which a landing foot counts as down."""
 
@@ -233,4 +235,9 @@ def solve_soles(
             v = legs.variable[j]
             if v >= 0:
                 q[j] = min(max(q[j] + step[v], legs.lower[j]), legs.upper[j])
+        for t in range(legs.table_x.shape[0]):
+            low, _, high, _ = table_bounds(legs.table_rows[t], q[legs.table_x[t]])
+            q[legs.table_y[t]] = min(max(q[legs.table_y[t]], low), high)
+        if np.abs(step).max() < STALLED:
+            return iteration + 1
     return limit

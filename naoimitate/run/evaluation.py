@@ -43,7 +43,7 @@ def summary(evaluation: Evaluation, robot: RobotModel) -> str:
         [
             "# Koenemann, Burget, Bennewitz 2014, evaluated again",
             "",
-            f"{robot.name} {robot.version}; persons seen at {CAMERA_RATE:g} Hz with {1000 * NOISE:g} mm of sensor noise;",
+            f"{robot.name} {robot.version}; persons seen at {CAMERA_RATE:g} Hz, {1000 * NOISE:g} mm of sensor noise;",
             f"{count} repetitions each. The paper used a real NAO v4 and a person in an Xsens suit.",
             "",
             "## Similarity (Figures 7 and 8) and stability",
