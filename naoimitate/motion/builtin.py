@@ -131,7 +131,7 @@ def _stepping(duration: float, swings: tuple[Swing, ...], **parts: Any) -> Scrip
 def _paper() -> Script:
     """The sequence of Koenemann 2014, figures 6 to 9; sole to sole 0.45 leg lengths apart in the hold."""
     raised = (2.4, 0.25, 0.35, 0.0)
-    stretched = _stretched_back(0.45 * BODY.leg, 0.25)
+    stretched = _stretched_back(0.45 * BODY.leg, 0.32)
     arms = Track(T_ARM, ((2.0, 4.0, HANGING), (7.8, 10.4, raised), (15.8, 18.4, HANGING)))
     lean = Track(UPRIGHT, ((7.4, 10.4, (0.0, 0.40, 0.0)), (15.8, 18.8, UPRIGHT)))
     script = _stepping(
@@ -149,7 +149,7 @@ def _stretched_back(distance: float, rise: float) -> FootPose:
     """Pose of the right foot ``distance`` m from the left sole, backwards and up (``rise``: share that is height)."""
     aside, up = 2.0 * STANCE_HALF - 0.03, rise * distance
     back = float(np.sqrt(distance**2 - up**2 - aside**2))
-    return (-back, STANCE_HALF - aside, up, -TOE_OUT, 0.6, 0.0)
+    return (-back, STANCE_HALF - aside, up, -TOE_OUT, 0.35, 0.0)
 
 
 def _step_and_reach() -> Script:

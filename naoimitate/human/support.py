@@ -1,0 +1,95 @@
+"""The person's support mode: of a whole recorded motion (``annotate``), and frame by frame (``SupportEstimator``)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from naoimitate.core.frames import LANDMARK, Array, Motion
+from naoimitate.human.body import ANKLE_HEIGHT_BY_STATURE, LEG_BY_STATURE
+from naoimitate.human.contact import MOVING, ContactRule, Contacts, find_contacts
+from naoimitate.human.floor import Floor
+from naoimitate.human.live_support import SupportEstimator
+
+__all__ = ["SupportEstimator", "annotate", "last_mode", "raw_support"]
+
+
+def annotate(motion: Motion, rule: ContactRule | None = None) -> Motion:
+    """The motion with its floor brought to z = 0, level, and its support known: ``D``, ``L``, ``R`` or ``F`` a frame.
+
+    Contacts that the source gives are used. While feet slide or pivot the last mode is kept. A motion whose support is
+    known already is returned as it is. The T-pose is not moved: it is a posture, not a place.
+    """
+    if motion.support is not None:
+        return motion
+    found = raw_support(motion, rule)
+    level = _on_level_floor(motion, found.floor)
+    return replace(level, support=last_mode(found.classes), contacts=found.planted)
+
+
+def raw_support(motion: Motion, rule: ContactRule | None = None) -> Contacts:
+    """Planted feet, floor, and the raw class of every frame of a motion, ``M`` (feet moving) included."""
+    return find_contacts(motion.time, motion.landmarks, motion.contacts, rule)
+
+
+def last_mode(classes: npt.NDArray[np.str_]) -> npt.NDArray[np.str_]:
+    """Support modes (T,) of raw classes: ``M`` keeps the mode before it; at the start it takes the first one after it.
+
+    Where nothing but ``M`` is found, ``D``.
+    """
+    known = classes != MOVING
+    if not known.any():
+        return np.full(len(classes), "D")
+    before = np.maximum.accumulate(np.where(known, np.arange(len(classes)), -1))
+    return np.asarray(classes[np.where(before < 0, np.argmax(known), before)])
+
+
+def _on_level_floor(motion: Motion, floor: Floor) -> Motion:
+    """The motion, turned and lifted so that its floor is z = 0."""
+    up = np.array([-floor.slope[0], -floor.slope[1], 1.0])
+    turn = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up / np.linalg.norm(up)])[0]
+    height = _floor_height(motion.landmarks, floor) / np.linalg.norm(up)
+
+    def moved(points: Array | None) -> Array | None:
+        if points is None:
+            return None
+        return np.asarray(turn.apply(points.reshape(-1, 3)).reshape(points.shape) - [0.0, 0.0, height])
+
+    landmarks = moved(motion.landmarks)
+    assert landmarks is not None
+    return replace(
+        motion,
+        landmarks=landmarks,
+        com=moved(motion.com),
+        orientations=_turned(turn, motion.orientations),
+        notes=(*motion.notes, f"the floor was {height:+.3f} m high, tilted by {np.degrees(turn.magnitude()):.1f} deg"),
+    )
+
+
+def _floor_height(landmarks: Array, floor: Floor) -> float:
+    """Height of the floor itself over the origin, m: below the ankles by their height in a person of this stature."""
+    ankles, balls = np.nan_to_num(np.nanmean(floor.heights[:, :2], axis=0), nan=0.0)
+    if not np.isfinite(floor.heights[:, 0]).any():
+        return float(balls)
+    bones = [("hip", "knee"), ("knee", "ankle")]
+    lengths = [
+        np.linalg.norm(landmarks[:, LANDMARK[f"{s}_{a}"]] - landmarks[:, LANDMARK[f"{s}_{b}"]], axis=-1)
+        for s in "lr"
+        for a, b in bones
+    ]
+    leg = 0.5 * sum(np.median(length[np.isfinite(length)]) for length in lengths if np.isfinite(length).any())
+    return float(ankles - ANKLE_HEIGHT_BY_STATURE * leg / LEG_BY_STATURE)
+
+
+def _turned(turn: Rotation, quaternions: Array | None) -> Array | None:
+    """Orientations (T, 7, 4) (w, x, y, z) after a turn of the world; missing ones (NaN) stay missing."""
+    if quaternions is None:
+        return None
+    turned = np.full_like(quaternions, np.nan)
+    known = np.isfinite(quaternions).all(axis=-1)
+    xyzw = (turn * Rotation.from_quat(np.roll(quaternions[known], -1, axis=-1))).as_quat()
+    turned[known] = np.roll(xyzw, 1, axis=-1)
+    return turned
