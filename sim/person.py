@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import mujoco
@@ -37,10 +36,15 @@ LIMBS = (
 COLOURED = ("hand", "toe")
 HEAD, NOSE = 0.062, 0.016
 """Radii of the head and of the nose that shows where it looks, fractions of the height."""
-CROWN = 0.06
-"""Top of the head above its centre as a fraction of the height."""
-ANKLE = 0.04
-"""Ankle above the ground, the same."""
+BONES = (
+    ("l_ankle", "l_knee", 0.246),
+    ("l_knee", "l_hip", 0.245),
+    ("hip", "shoulder", 0.288),
+    ("shoulder", "head", 0.122),
+)
+"""Bones that stand on each other and their share of the height (Drillis and Contini 1966); crown and ankle are the rest."""
+PELVIS = 0.53
+"""Height of the pelvis as a fraction of the person's, where the source shows no feet."""
 
 SETTLING = 4.0
 """s: the person is moved along so that over this time they stay beside the robot; quicker moves are theirs."""
@@ -57,21 +61,23 @@ def stage_person(motion: Motion, human_time: Array, time: Array, height: float, 
     shown = np.array([motion.at(max(moment, 0.0)).landmarks for moment in np.maximum.accumulate(moments)])
     scale = height / person_height(shown)
     staged = np.asarray(scale * shown @ yaw_matrix(-_heading(shown[0])).T)
-    feet = staged[:, [LANDMARK[f"{side}_{end}"] for side in SIDES for end in ("ankle", "toe")]]
-    staged[..., 2] += LIMBS[-1][2] * height - np.nanmin(feet[..., 2])
+    staged[..., 2] -= _floor(staged, height)
     drift = slow_part(staged[:, LANDMARK["pelvis"], :2] - beside, time, SETTLING)
     staged[..., :2] -= drift[:, None, :]
     return staged
 
 
 def person_height(landmarks: Array) -> float:
-    """Standing height (m) of the person in frames (T, 19, 3): their bones end to end, median."""
-    chain = [landmarks[:, LANDMARK[f"l_{name}"]] for name in ("ankle", "knee", "hip")]
-    chain += [landmarks[:, [LANDMARK[f"l_{name}"], LANDMARK[f"r_{name}"]]].mean(axis=1) for name in ("hip", "shoulder")]
-    chain.append(landmarks[:, LANDMARK["head"]])
-    bones = [np.linalg.norm(b - a, axis=1) for a, b in pairwise(chain)]
-    del bones[2]  # from one hip to the middle between the hips: no height
-    return float(np.nanmedian(np.sum(bones, axis=0)) / (1.0 - CROWN - ANKLE))
+    """Standing height (m) of the person in frames (T, 19, 3), from the bones that are there; NaN without any."""
+    points = {name: landmarks[:, row] for name, row in LANDMARK.items()}
+    for name in ("hip", "shoulder"):
+        points[name] = 0.5 * (points[f"l_{name}"] + points[f"r_{name}"])
+    length, share = 0.0, 0.0
+    for start, end, part in BONES:
+        bone = np.linalg.norm(points[end] - points[start], axis=1)
+        if np.isfinite(bone).any():
+            length, share = length + float(np.nanmedian(bone)), share + part
+    return length / share if share > 0.0 else np.nan
 
 
 def draw_person(scene: Any, landmarks: Array) -> None:
@@ -82,11 +88,19 @@ def draw_person(scene: Any, landmarks: Array) -> None:
     for side in SIDES:
         for start, end, radius in LIMBS:
             colour = MATERIALS[SIDE_COLOUR[side]] if end in COLOURED else BODY_COLOUR
-            ends = (landmarks[LANDMARK[f"{side}_{name}"]] for name in (start, end))
-            _capsule(scene, *ends, radius * tall, colour)
+            first, last = (landmarks[LANDMARK[f"{side}_{name}"]] for name in (start, end))
+            _capsule(scene, first, last, radius * tall, colour)
     head = landmarks[LANDMARK["head"]]
     _ball(scene, head, HEAD * tall, SKIN)
     _ball(scene, head + HEAD * tall * _forward(landmarks), NOSE * tall, SKIN)
+
+
+def _floor(staged: Array, height: float) -> float:
+    """Height (m) of the floor under a staged person: below the lowest point of the feet in all frames."""
+    feet = staged[:, [LANDMARK[f"{side}_{end}"] for side in SIDES for end in ("ankle", "toe")], 2]
+    if np.isfinite(feet).any():
+        return float(np.nanmin(feet)) - LIMBS[-1][2] * height
+    return float(np.nanmedian(staged[:, LANDMARK["pelvis"], 2])) - PELVIS * height
 
 
 def _forward(landmarks: Array) -> Array:
@@ -98,7 +112,7 @@ def _forward(landmarks: Array) -> Array:
 
 
 def _heading(landmarks: Array) -> float:
-    x, y, _ = _forward(landmarks)
+    x, y, _ = np.nan_to_num(_forward(landmarks))
     return float(np.arctan2(y, x))
 
 
@@ -106,8 +120,11 @@ def slow_part(path: Array, time: Array, window: float) -> Array:
     """Mean (T, 2) of a path over ``window`` (s) around each moment; frames need not be evenly spaced in time."""
     half = 0.5 * window
     first, last = np.searchsorted(time, time - half), np.searchsorted(time, time + half, side="right")
-    total = np.concatenate([np.zeros((1, 2)), np.cumsum(np.nan_to_num(path), axis=0)])
-    return np.asarray((total[last] - total[first]) / (last - first)[:, None])
+    known = np.isfinite(path).all(axis=1)
+    rows = np.column_stack([np.where(known[:, None], path, 0.0), known])
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
+    window_sum = total[last] - total[first]
+    return np.asarray(window_sum[:, :2] / np.maximum(window_sum[:, 2:], 1.0))
 
 
 def _capsule(scene: Any, start: Array, end: Array, radius: float, colour: tuple[float, ...]) -> None:

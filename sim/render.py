@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import imageio.v2 as imageio
 import numpy as np
@@ -39,11 +40,12 @@ def render_video(
     human: Motion | None = None,
     human_time: Array | None = None,
     view: View | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> Path:
     """Write an mp4 of a run: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), as planned or as simulated.
 
     human: the person, as tall as the robot and at its right; human_time: (T,) s in their motion, default: since the
-    first frame. Raises RenderingUnavailable without OpenGL.
+    first frame; progress: told the share that is done. Raises RenderingUnavailable without OpenGL.
     """
     frames = np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, 1.0 / fps), side="right") - 1
     path = Path(path)
@@ -52,11 +54,14 @@ def render_video(
         centre = _camera_path(base_pos, time)
         if people is not None:
             centre = centre - np.array([0.0, 0.5 * BESIDE * stage.robot_height])
-        with imageio.get_writer(path, fps=fps, codec="libx264", quality=8) as video:
-            for frame in frames:
+        video: Any = imageio.get_writer(path, fps=fps, codec="libx264", quality=8)
+        with video:
+            for number, frame in enumerate(frames):
                 pose = q[frame], base_pos[frame], base_quat[frame]
                 person = None if people is None else people[frame]
                 video.append_data(stage.draw(pose, centre[frame], view or View(), person))
+                if progress is not None:
+                    progress((number + 1) / len(frames))
     return path
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,11 +62,13 @@ def simulate(
     stiffness: float = DEFAULT.stiffness,
     compensation: bool = True,
     settings: SimSettings = DEFAULT,
+    progress: Callable[[float], None] | None = None,
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
 
     stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's gravity compensation.
-    Each frame's command is under way from the time of the frame before, and is due at its own.
+    progress: told the share that is done. Each frame's command is under way from the time of the frame before, and is
+    due at its own.
     """
     physics = Physics(robot, replace(settings, stiffness=stiffness))
     commands = q
@@ -75,18 +78,24 @@ def simulate(
             [gravity.command(*frame, stiffness) for frame in zip(q, base_quat, support, strict=True)]
         )  # fmt: skip
     physics.place(q[0], base_pos[0], base_quat[0])
-    durations = np.diff(time, prepend=time[0] - SETTLE_TIME)
     samples = []
-    for command, duration, mode in zip(commands, durations, support, strict=True):
-        physics.advance(command, float(duration))
-        margin = _cop_margin(robot, physics, str(mode))
-        samples.append((physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin))
+    for command, due, mode in zip(commands, time - time[0] + SETTLE_TIME, support, strict=True):
+        physics.advance(command, float(due) - physics.time)
+        samples.append(_sample(robot, physics, str(mode)))
+        if progress is not None:
+            progress(len(samples) / len(time))
     sim_q, sim_pos, sim_quat, load, margin = (np.array(column) for column in zip(*samples, strict=True))
     lean, height = tilt(base_quat, sim_quat), sim_pos[:, 2] / base_pos[:, 2]
     swing = swing_load(support, load, physics.weight)
     return SimResult(
         time, sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, has_fallen(lean, height, swing)
     )  # fmt: skip
+
+
+def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float]:
+    """Joints, torso position and orientation, foot loads, margin of the centre of pressure: see ``SimResult``."""
+    margin = _cop_margin(robot, physics, support)
+    return physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin
 
 
 def _cop_margin(robot: RobotModel, physics: Physics, support: str) -> float:

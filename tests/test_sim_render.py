@@ -83,7 +83,7 @@ def test_the_person_faces_the_same_way_is_as_tall_and_stands_beside(nao: RobotMo
         staged = stage_person(motion, time, time, 0.6, beside)
         across = staged[0, LANDMARK["l_hip"]] - staged[0, LANDMARK["r_hip"]]
         assert across[1] > 10.0 * abs(across[0])
-        assert person_height(staged) == pytest.approx(0.6)
+        assert person_height(staged) == pytest.approx(0.6, rel=1e-6)
         assert 0.0 < staged[..., 2].min() < 0.03 and 0.5 < staged[0, :, 2].max() < 0.6
         np.testing.assert_allclose(staged[:, LANDMARK["pelvis"], :2], beside, atol=0.05)
 
@@ -94,6 +94,16 @@ def test_a_person_who_walks_away_is_kept_beside_the_robot() -> None:
     staged = stage_person(walk, time, time, 0.6, np.zeros((len(time), 2)))
     assert np.ptp(walk.landmarks[:, LANDMARK["pelvis"], 0]) > 1.0
     assert np.abs(staged[:, LANDMARK["pelvis"], 0]).max() < 0.4
+
+
+def test_a_person_without_legs_or_with_gaps_is_drawn_as_far_as_seen(person: Motion) -> None:
+    time = np.arange(0.0, 5.0, 0.1)
+    landmarks = person.landmarks.copy()
+    landmarks[:, [LANDMARK[f"{side}_{name}"] for side in "lr" for name in ("knee", "ankle", "toe")]] = np.nan
+    landmarks[5:8] = np.nan
+    staged = stage_person(Motion("half", person.time, landmarks), time, time, 0.6, np.zeros((len(time), 2)))
+    assert np.isfinite(staged[0, LANDMARK["head"]]).all()
+    assert staged[0, LANDMARK["head"], 2] == pytest.approx(0.55, abs=0.04)
 
 
 def test_the_person_holds_while_the_robot_imitates_nothing(person: Motion) -> None:

@@ -102,6 +102,25 @@ def test_a_foot_that_carries_weight_in_its_swing_is_reported(robot: RobotModel) 
     assert result.swing_load.min() > 0.2 and result.fell.all()
 
 
+@pytest.mark.parametrize("rate", [50.0, 120.0, 240.0])
+def test_time_keeps_pace_at_every_frame_rate(nao: RobotModel, rate: float) -> None:
+    """Over 2 s an arm goes down by 0.4 rad; frames need not be multiples of the integrator's step."""
+    frames = round(2.0 * rate)
+    q, joint = nao.postures["stand"], nao.joint("LShoulderPitch")
+    base_pos, base_quat = stand_on_floor(nao, q)
+    plan = np.tile(q, (frames, 1))
+    plan[:, joint] += 0.2 * np.arange(frames) / rate
+    result = simulate(
+        nao,
+        np.arange(frames) / rate,
+        plan,
+        np.tile(base_pos, (frames, 1)),
+        np.tile(base_quat, (frames, 1)),
+        np.full(frames, "D"),
+    )
+    assert result.q[-1, joint] == pytest.approx(plan[-1, joint] - 0.2 * 0.02, abs=1.5e-3)  # 20 ms of servo lag
+
+
 def test_frames_may_be_uneven_in_time(nao: RobotModel) -> None:
     q = nao.postures["stand"]
     time = np.cumsum(np.resize([0.01, 0.004, 0.02], 60))
