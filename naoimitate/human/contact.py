@@ -41,7 +41,7 @@ class ContactRule:
     fast: float = 0.45
     tip: float = 0.40
     tip_touch: float = 0.020
-    tip_speed: float = 1.2
+    tip_speed: float = 1.15
     gap: float = 0.1
     blip: float = 0.11
     flight: float = 0.050
@@ -76,7 +76,7 @@ class Contacts:
 
 def foot_points(landmarks: Array, tip: float) -> Array:
     """Ankle, ball and tip of the toes of both feet, (..., 19, 3) m -> (..., 2, 3, 3) m."""
-    known = landmarks[..., _FEET, :]
+    known = np.where(np.isfinite(landmarks[..., _FEET, :]), landmarks[..., _FEET, :], np.nan)
     ankle, ball = known[..., 0, :], known[..., 1, :]
     return np.stack([ankle, ball, ball + tip * (ball - ankle)], axis=-2)
 
@@ -88,7 +88,7 @@ def find_contacts(
     rule = rule or ContactRule()
     points = smooth(time, foot_points(landmarks, rule.tip))
     speed = speeds(time, points)
-    floor = fit_floor(points, (speed < SLOW) & lowest(points, landmarks))
+    floor = _floor(points, speed, landmarks)
     heights = floor.above(points)
     raw = _planted(rule, heights, speed) if given is None else given
     planted = np.stack([_without_noise(time, raw[:, side], rule) for side in (0, 1)], axis=1)
@@ -108,7 +108,18 @@ def lowest(points: Array, landmarks: Array) -> Mask:
     clearance = 0.10  # m; joint centres of a lying or kneeling person may be this much below a foot's
     others = np.where(np.isfinite(landmarks[:, _BODY, 2]), landmarks[:, _BODY, 2], np.inf).min(axis=1)
     feet = np.where(np.isfinite(points[..., 2]), points[..., 2], np.inf).min(axis=(1, 2))
-    return np.asarray(points[..., 2] < np.minimum(others, feet)[:, None, None] + clearance)
+    low = points[..., 2] < np.minimum(others, feet)[:, None, None] + clearance
+    return np.asarray(low & np.isfinite(points).all(axis=-1))
+
+
+def _floor(points: Array, speed: Array, landmarks: Array) -> Floor:
+    """The floor under slow low feet; without such feet, under low feet; without those, under the whole body."""
+    low = lowest(points, landmarks)
+    slow = low & (speed < SLOW)
+    if low.any():
+        return fit_floor(points, slow if slow.any() else low)
+    bottom = np.where(np.isfinite(landmarks[..., 2]), landmarks[..., 2], np.inf).min()
+    return Floor(np.zeros(2), np.full((2, points.shape[2]), bottom if np.isfinite(bottom) else np.nan))
 
 
 def smooth(time: Array, points: Array, cutoff: float = 8.0) -> Array:

@@ -50,16 +50,11 @@ class Floor:
 
 def fit_floor(points: Array, candidates: Mask) -> Floor:
     """Fit the floor to feet points (T, 2, K, 3) m, of which the ``candidates`` (T, 2, K) may stand on it."""
-    finite = np.isfinite(points).all(axis=-1)
-    slow = candidates & finite
-    for kind in range(points.shape[2]):
-        if not slow[:, :, kind].any():
-            slow[:, :, kind] = finite[:, :, kind]
-    axes = _tilt_axes(points[..., :2][slow])
-    slope, levels = _search(points, slow, axes)
+    axes = _tilt_axes(points[..., :2][candidates])
+    slope, levels = _search(points, candidates, axes)
     floor = Floor(slope, np.tile(levels, (2, 1)))
     for _ in range(REFINEMENTS):
-        floor = _refine(points, slow, axes, floor)
+        floor = _refine(points, candidates, axes, floor)
     return floor
 
 
@@ -67,18 +62,18 @@ def _tilt_axes(xy: Array) -> Array:
     """(n, 2) horizontal directions, n = 0 to 2, along which the samples (N, 2) m reach far enough to tell a tilt."""
     if len(xy) < 2:
         return np.zeros((0, 2))
-    axes = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2]
-    return np.array([axis for axis in axes if np.ptp(xy @ axis) > SPAN_FOR_TILT]).reshape(-1, 2)
+    axes: Array = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2]
+    return axes[np.ptp(xy @ axes.T, axis=0) > SPAN_FOR_TILT]
 
 
-def _search(points: Array, slow: Mask, axes: Array) -> tuple[Array, Array]:
+def _search(points: Array, candidates: Mask, axes: Array) -> tuple[Array, Array]:
     """The slope along the longest axis that puts most samples into one level of each kind; slope (2,), levels (K,)."""
     tilts = TILTS[np.argsort(np.abs(TILTS), kind="stable")] if len(axes) else np.zeros(1)
     axis = axes[0] if len(axes) else np.zeros(2)
     best, found = -1, (np.zeros(2), np.full(points.shape[2], np.nan))
     for tilt in tilts:
         flat = points[..., 2] - points[..., :2] @ (tilt * axis)
-        levels = [_level(flat[:, :, kind][slow[:, :, kind]]) for kind in range(points.shape[2])]
+        levels = [_level(flat[:, :, kind][candidates[:, :, kind]]) for kind in range(points.shape[2])]
         count = sum(count for _, count in levels)
         if count > best:
             best, found = count, (tilt * axis, np.array([level for level, _ in levels]))
@@ -96,9 +91,9 @@ def _level(heights: Array) -> tuple[float, int]:
     return float(np.median(low[fullest : fullest + count[fullest]])), int(count[fullest])
 
 
-def _refine(points: Array, slow: Mask, axes: Array, floor: Floor) -> Floor:
+def _refine(points: Array, candidates: Mask, axes: Array, floor: Floor) -> Floor:
     """One round: least squares for the tilt over the samples in the band, then the low edge of each kind and side."""
-    near = slow & (np.abs(np.nan_to_num(floor.above(points), nan=np.inf)) < BAND)
+    near = candidates & (np.abs(floor.above(points)) < BAND)
     slope = floor.slope
     if len(axes) and near.any():
         _, side, kind = np.nonzero(near)

@@ -14,6 +14,8 @@ from naoimitate.human.contact import MOVING, ContactRule, Contacts, find_contact
 from naoimitate.human.floor import Floor
 from naoimitate.human.live_support import SupportEstimator
 
+_LEG = (("hip", "knee"), ("knee", "ankle"))
+
 __all__ = ["SupportEstimator", "annotate", "last_mode", "raw_support"]
 
 
@@ -71,17 +73,18 @@ def _on_level_floor(motion: Motion, floor: Floor) -> Motion:
 
 def _floor_height(landmarks: Array, floor: Floor) -> float:
     """Height of the floor itself over the origin, m: below the ankles by their height in a person of this stature."""
-    ankles, balls = np.nan_to_num(np.nanmean(floor.heights[:, :2], axis=0), nan=0.0)
-    if not np.isfinite(floor.heights[:, 0]).any():
-        return float(balls)
-    bones = [("hip", "knee"), ("knee", "ankle")]
-    lengths = [
-        np.linalg.norm(landmarks[:, LANDMARK[f"{s}_{a}"]] - landmarks[:, LANDMARK[f"{s}_{b}"]], axis=-1)
-        for s in "lr"
-        for a, b in bones
-    ]
-    leg = 0.5 * sum(np.median(length[np.isfinite(length)]) for length in lengths if np.isfinite(length).any())
-    return float(ankles - ANKLE_HEIGHT_BY_STATURE * leg / LEG_BY_STATURE)
+    heights = floor.heights.mean(axis=0)
+    leg = sum(_median_length(landmarks, f"{side}_{a}", f"{side}_{b}") for side in "lr" for a, b in _LEG) / 2.0
+    candidates = np.array([heights[0] - ANKLE_HEIGHT_BY_STATURE * leg / LEG_BY_STATURE, heights[1]])
+    known = candidates[np.isfinite(candidates)]
+    return float(known[0]) if len(known) else 0.0
+
+
+def _median_length(landmarks: Array, a: str, b: str) -> float:
+    """Median distance of two landmarks over a motion (T, 19, 3) m, NaN where they were never seen together."""
+    with np.errstate(invalid="ignore"):
+        lengths = np.linalg.norm(landmarks[:, LANDMARK[a]] - landmarks[:, LANDMARK[b]], axis=-1)
+    return float(np.median(lengths[np.isfinite(lengths)])) if np.isfinite(lengths).any() else float("nan")
 
 
 def _turned(turn: Rotation, quaternions: Array | None) -> Array | None:
