@@ -42,7 +42,7 @@ BONES = (
     ("hip", "shoulder", 0.288),
     ("shoulder", "head", 0.122),
 )
-"""Bones that stand on each other and their share of the height (Drillis and Contini 1966); crown and ankle are the rest."""
+"""Bones on top of each other and their share of the height (Drillis and Contini 1966); crown and ankle are the rest."""
 PELVIS = 0.53
 """Height of the pelvis as a fraction of the person's, where the source shows no feet."""
 
