@@ -87,7 +87,7 @@ def center_of_mass(landmarks: Array) -> Array:
 
 def _center_of_known(landmarks: Array) -> Array:
     """Centre of mass of the segments whose landmarks are all there, (N, 19, 3) m -> (N, 3) m."""
-    complete = np.isfinite(landmarks).all(axis=-1)
+    complete = np.asarray(np.isfinite(landmarks).all(axis=-1))
     lacking = np.einsum("nl,sl->ns", ~complete, _WEIGHTS)
     mass = np.where(lacking > 0.0, 0.0, _MASSES)
     total = mass.sum(axis=-1, keepdims=True)

@@ -27,6 +27,7 @@ def annotate(motion: Motion, rule: ContactRule | None = None) -> Motion:
     """
     if motion.support is not None:
         return motion
+    motion = replace(motion, landmarks=np.where(np.isfinite(motion.landmarks), motion.landmarks, np.nan))
     found = raw_support(motion, rule)
     level = _on_level_floor(motion, found.floor)
     return replace(level, support=last_mode(found.classes), contacts=found.planted)
@@ -82,8 +83,7 @@ def _floor_height(landmarks: Array, floor: Floor) -> float:
 
 def _median_length(landmarks: Array, a: str, b: str) -> float:
     """Median distance of two landmarks over a motion (T, 19, 3) m, NaN where they were never seen together."""
-    with np.errstate(invalid="ignore"):
-        lengths = np.linalg.norm(landmarks[:, LANDMARK[a]] - landmarks[:, LANDMARK[b]], axis=-1)
+    lengths = np.linalg.norm(landmarks[:, LANDMARK[a]] - landmarks[:, LANDMARK[b]], axis=-1)
     return float(np.median(lengths[np.isfinite(lengths)])) if np.isfinite(lengths).any() else float("nan")
 
 
