@@ -25,7 +25,7 @@ _PALM = (yaw_matrix(np.pi / 2), yaw_matrix(-np.pi / 2))
 
 
 BRANCH_GAIN = 0.006
-"""[m] by which another arm posture must be nearer to the target to be worth a change."""
+"""[m] by which another arm posture must fit better to be worth a change."""
 BRANCH_PERIOD = 12
 """Frames between two looks for a better arm posture."""
 BRANCH_SPEED = 0.6
@@ -48,7 +48,7 @@ class Arms:
         self._reserve = reserve
         self._thorough = weights._replace(iterations=30.0)
         self._transit = weights._replace(tip=0.0, rest=0.1, iterations=1.0)
-        self._anywhere = (np.full(len(robot.joint_names), -10.0), np.full(len(robot.joint_names), 10.0))
+        self._anywhere = (robot.lower, robot.upper)
         self._seeds = [np.unique([posture[limb.joints] for posture in robot.postures.values()], axis=0) for limb in self._limbs]
         self.reset()
         self._head = robot.chains["head"]
@@ -97,34 +97,34 @@ class Arms:
             if self._branch[side] is not None:
                 iterations += self._change_branch(side, q, task, low, high, rows)
                 continue
-            done, error = solve_limb(self._robot.tree, limb, self._weights, *task, q, low, high, *rows)
+            done, error, misfit = solve_limb(self._robot.tree, limb, self._weights, *task, q, low, high, *rows)
             iterations += done
             if error > BRANCH_GAIN and self._frames % BRANCH_PERIOD == side:
-                iterations += self._look_for_branch(side, q, task, error)
+                iterations += self._look_for_branch(side, q, task, misfit)
         return q, iterations
 
-    def _look_for_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], error: float) -> int:
-        """Start afresh from other postures; keep the best arm posture that is clearly nearer to the target."""
+    def _look_for_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], misfit: float) -> int:
+        """Start afresh from other postures; keep the best arm posture that fits clearly better."""
         limb, iterations = self._limbs[side], 0
         for seed in self._seeds[side]:
             trial = q.copy()
             trial[limb.joints] = seed
-            done, found = solve_limb(self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side])
+            done, _, found = solve_limb(self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side])
             iterations += done
-            if found < error - BRANCH_GAIN:
-                error, self._branch[side] = found, trial[limb.joints]
+            if found < misfit - BRANCH_GAIN:
+                misfit, self._branch[side] = found, trial[limb.joints]
         return iterations
 
     def _change_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], low: Array, high: Array, rows: tuple[Array, Array]) -> int:
         """Move an arm of q through joint space towards its other posture, until that is near."""
         limb, goal = self._limbs[side], q.copy()
         goal[limb.joints] = self._branch[side]
-        done, _ = solve_limb(self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side])
+        done, _, _ = solve_limb(self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side])
         way = limb._replace(rest=goal[limb.joints])
         before = q[limb.joints]
         slow_low, slow_high = q + BRANCH_SPEED * (low - q), q + BRANCH_SPEED * (high - q)
         free = (task[0], np.zeros(3), task[2], 0)
-        more, _ = solve_limb(self._robot.tree, way, self._transit, *free, q, slow_low, slow_high, *rows)
+        more, _, _ = solve_limb(self._robot.tree, way, self._transit, *free, q, slow_low, slow_high, *rows)
         near = np.abs(q[limb.joints] - way.rest).max() < BRANCH_NEAR
         stuck = np.abs(q[limb.joints] - before).max() < 1e-4
         self._branch[side] = None if near or stuck else way.rest

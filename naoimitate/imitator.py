@@ -90,7 +90,7 @@ class Imitator:
         """
         if self._subject is None:
             raise CalibrationError("calibrate(frame) with a T-pose, or use(subject), before the first step")
-        seen = self._observer.see(frame, support or frame.support or "D")
+        seen = self._observer.see(frame, support)
         targets = self.mapping.targets(seen.body.posture)
         footing = self._footing(seen, targets, ahead, may_lift)
         if self._pose is None:

@@ -46,12 +46,14 @@ class LimbWeights(NamedTuple):
 
     tip: float = 1.0
     """Of the hand; 0 while the arm changes its branch in joint space."""
-    bend: float = 0.15
-    """Of the elbow's place on the human's upper-arm direction: enough to choose a branch, too weak to move the hand."""
-    orientation: float = 0.05
+    bend: float = 0.3
+    """Of the elbow's place on the human's upper-arm direction."""
+    orientation: float = 0.1
     """[m/rad] of the tip's orientation, where one is asked for."""
-    rest: float = 0.004
+    rest: float = 0.01
     """[m/rad] towards the rest posture: without it a joint at a singularity runs to its stop for a millimetre."""
+    null_damping: float = 0.001
+    """[m/rad] below which a direction counts as one that the tip leaves free: elbow, orientation and rest act there."""
     damping: float = 0.004
     """[m/rad], plus half of the error's own length (Sugihara 2011)."""
     tolerance: float = 1e-5
@@ -124,13 +126,14 @@ def solve_limb(
     q_high: Array,
     rows: Array,
     bounds: Array,
-) -> tuple[int, float]:
+) -> tuple[int, float, float]:
     """Move one limb of q (J,) rad towards its target, never past a bound.
 
     target: (3,) m, tip minus root in the base frame. bend: (3,) unit vector root to elbow, zero for none.
     tip_rotation: (3, 3) base from tip; orientation_rows: 0 free, 2 only its z axis (upright), 3 all.
     q_low, q_high: (J,) rad of this frame. rows (C, n), bounds (C,): ``rows (x - x0) >= bounds`` (collisions).
-    Returns (iterations, remaining tip error in m). Where no step is feasible q is unchanged.
+    Returns (iterations, tip error in m, misfit in m: root of the whole weighted cost), the latter two before the last
+    step. Where no step is feasible q is unchanged.
     """
     n, count = limb.joints.shape[0], q.shape[0]
     pos, rot = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
@@ -139,7 +142,7 @@ def solve_limb(
     C, b = np.zeros((2 * n + rows.shape[0], n)), np.empty(2 * n + rows.shape[0])
     wanted_bend = limb.root + limb.upper_length * bend
     bend_weight = settings.bend * np.sqrt(bend[0] ** 2 + bend[1] ** 2 + bend[2] ** 2)
-    length, done = 0.0, 0
+    length, misfit, done = 0.0, 0.0, 0
     limit = int(settings.iterations)
     for iteration in range(limit + 1):
         forward(tree, q, pos, rot)
@@ -147,13 +150,17 @@ def solve_limb(
         tip = pos[row] + rot[row] @ limb.tip
         error = limb.root + target - tip
         length = float(np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2))
+        elbow = pos[limb.bend_joint + 1] + rot[limb.bend_joint + 1] @ limb.bend
+        misfit = (settings.tip * length) ** 2 + bend_weight**2 * np.sum((wanted_bend - elbow) ** 2)
+        for i in range(n):
+            misfit += (settings.rest * (q[limb.joints[i]] - limb.rest[i])) ** 2
         if iteration == limit or (iteration > 0 and np.abs(x).max() < 1e-5):
             break
         H, g = np.zeros((n, n)), np.zeros(n)
-        point_jacobian(tree, pos, rot, limb.tip_joint, tip, J)
-        _add_rows(J, error, settings.tip, limb.joints, H, g)
+        for i in range(n):
+            H[i, i] = settings.rest**2
+            g[i] = settings.rest**2 * (limb.rest[i] - q[limb.joints[i]])
         if bend_weight > 0.0:
-            elbow = pos[limb.bend_joint + 1] + rot[limb.bend_joint + 1] @ limb.bend
             point_jacobian(tree, pos, rot, limb.bend_joint, elbow, J)
             _add_rows(J, wanted_bend - elbow, bend_weight, limb.joints, H, g)
         if orientation_rows > 0:
@@ -162,14 +169,17 @@ def solve_limb(
             if orientation_rows == 2:
                 turn = np.cross(rot[row][:, 2], tip_rotation[:, 2])
             _add_rows(J, turn, settings.orientation, limb.joints, H, g)
+        point_jacobian(tree, pos, rot, limb.tip_joint, tip, J)
+        if settings.tip > 0.0:
+            _project(J, limb.joints, settings.null_damping, H, g)
+        _add_rows(J, error, settings.tip, limb.joints, H, g)
         for i in range(n):
             angles[i] = q[limb.joints[i]]
         limit_avoiding_weights(angles, x, limb.lower, limb.upper, weights)
         damping = settings.damping**2 + 0.5 * length**2 * settings.damping
         for i in range(n):
             j = limb.joints[i]
-            H[i, i] += damping * min(weights[i], 10.0) + settings.rest**2
-            g[i] += settings.rest**2 * (limb.rest[i] - angles[i])
+            H[i, i] += damping * min(weights[i], 10.0)
             middle = 0.5 * (q_low[j] + q_high[j])
             C[2 * i, i], b[2 * i] = 1.0, max(q_low[j], min(limb.lower[i], middle)) - angles[i]
             C[2 * i + 1, i], b[2 * i + 1] = -1.0, angles[i] - min(q_high[j], max(limb.upper[i], middle))
@@ -184,7 +194,22 @@ def solve_limb(
             q[limb.joints[i]] = angles[i] + x[i]
         if length < settings.tolerance:
             break
-    return done, length
+    return done, length, np.sqrt(misfit)
+
+
+@njit(cache=True)
+def _project(J: Array, joints: Array, damping: float, H: Array, g: Array) -> None:
+    """Confine a secondary task to what the tip leaves free: H, g -> N H N, N g with N = E - J^+ J, J^+ damped."""
+    n = joints.shape[0]
+    Jn = np.empty((3, n))
+    for i in range(n):
+        Jn[:, i] = J[:, joints[i]]
+    A = Jn @ Jn.T
+    for a in range(3):
+        A[a, a] += damping**2
+    N = np.eye(n) - Jn.T @ np.linalg.solve(A, Jn)
+    H[:] = N @ H @ N
+    g[:] = N @ g
 
 
 @njit(cache=True)

@@ -1,4 +1,4 @@
-"""The tool that computes a robot's landing set, by solving both one-foot poses of every relative sole pose of a grid."""
+"""The tool that computes a robot's landing set: it solves both one-foot poses of every relative sole pose of a grid."""
 
 from __future__ import annotations
 
@@ -10,11 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance, ClearanceSettings
-from naoimitate.balance.landing import LandingSet
-from naoimitate.balance.legs import POSE, LegLimits, LegWeights, build_legs
-from naoimitate.balance.offset import OffsetLaw
-from naoimitate.balance.stabiliser import Plan, Stabiliser
-from naoimitate.balance.swing import SwingSettings
+from naoimitate.balance.legs import POSE, LegGoal, LegLimits, LegWeights, Stance, build_legs, solve_legs
+from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.robot.model import RobotModel
 
@@ -24,6 +21,12 @@ COM_TOLERANCE = 0.001
 """[m] of the CoM from the foot's centre that still counts as over it."""
 ARMS = ("stand", "calibration", "zero")
 """Postures whose arms every member of the set must be able to carry."""
+CLOSED = 2e-5
+"""Sum of m and rad by which a planted sole may differ from where it is asked to be."""
+STEPS = 25
+"""Solves in which the foot is brought to its place, and then the CoM over one foot."""
+STEP = 0.2
+"""[rad] of each joint in one solve."""
 
 
 @dataclass(frozen=True)
@@ -46,30 +49,46 @@ class LandingGrid:
     """[m] by which the polygons are drawn in."""
 
 
-def compute_landing_set(robot: RobotModel, grid: LandingGrid | None = None, progress: Callable[[float], None] | None = None) -> dict[str, Any]:
-    """The ``landing`` section of a robot's data: polygons of places where both feet can carry, by yaw."""
+def compute_landing_set(
+    robot: RobotModel, grid: LandingGrid | None = None, progress: Callable[[float], None] | None = None
+) -> dict[str, Any]:
+    """The ``landing`` section of a robot's data: polygons of places where both feet can carry, by yaw.
+
+    A place belongs to a yaw when it is proved there and half-way to both neighbours, because yaws between are
+    interpolated. progress: called with the share that is done.
+    """
     grid = grid or LandingGrid()
     count = round(grid.behind / grid.step)
     xs = np.arange(-count, count + 1) * grid.step
     ys = np.arange(grid.narrow, grid.wide + 1e-9, grid.step)
-    yaws = np.linspace(-grid.turn, grid.turn, grid.turns)
-    prover = _Prover(robot)
+    points = np.array([(x, y) for x in xs for y in ys])
+    yaws = np.linspace(-grid.turn, grid.turn, 2 * grid.turns - 1)
+    proved = _proved(Prover(robot), points, yaws, progress)
     angles = np.arange(grid.directions) * 2.0 * np.pi / grid.directions
     normals = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     kept, reach = [], []
-    for k, yaw in enumerate(yaws):
-        points = np.array([(x, y) for x in xs for y in ys])
-        good = np.array([prover.both_feet(p, yaw) for p in points])
-        if progress is not None:
-            progress((k + 1) / len(yaws))
+    for k in range(0, len(yaws), 2):
+        good = proved[max(k - 1, 0) : k + 2].all(axis=0)
         if good.sum() >= 3:
-            kept.append(float(yaw))
+            kept.append(float(yaws[k]))
             reach.append(_polygon(points[good], points[~good], normals) - grid.reserve)
     return {
         "directions_deg": [round(float(a), 3) for a in np.degrees(angles)],
         "yaws": [round(y, 4) for y in kept],
         "reach": [[round(float(r), 4) for r in row] for row in reach],
     }
+
+
+def _proved(
+    prover: Prover, points: Array, yaws: Array, progress: Callable[[float], None] | None
+) -> npt.NDArray[np.bool_]:
+    """Which points (N, 2) m are proved at which yaws (Y,) rad, (Y, N)."""
+    rows = []
+    for yaw in yaws:
+        rows.append([prover.both_feet(p, yaw) for p in points])
+        if progress is not None:
+            progress(len(rows) / len(yaws))
+    return np.array(rows)
 
 
 def _polygon(good: Array, bad: Array, normals: Array) -> Array:
@@ -81,20 +100,19 @@ def _polygon(good: Array, bad: Array, normals: Array) -> Array:
             return np.asarray(reach)
         levels = bad[inside] @ normals.T
         kept_good = good[(good @ normals.T <= reach + 1e-9).all(axis=1)]
-        losses = np.array([[(kept_good @ n > level - 1e-9).sum() for n, level in zip(normals, row, strict=True)] for row in levels])
+        along = kept_good @ normals.T
+        losses = np.array([(along > row - 1e-9).sum(axis=0) for row in levels])
         point, cut = np.unravel_index(int(losses.argmin()), losses.shape)
         reach[cut] = levels[point, cut] - 1e-6
 
 
-class _Prover:
+class Prover:
     """Tries whether the CoM comes over either foot of a stance, with several arm postures."""
 
     def __init__(self, robot: RobotModel) -> None:
-        self._robot = robot
-        limits = LegLimits()
-        everywhere = LandingSet(np.array([-3.0, 3.0]), np.array([[1.0, 0.0]]), np.full((2, 1), 9.0))
-        weights = LegWeights(foot=0.05)
-        self._stabiliser = Stabiliser(robot, build_legs(robot, limits), everywhere, weights, OffsetLaw(), SwingSettings())
+        self._tree, self._legs = robot.tree, build_legs(robot, LegLimits())
+        self._maker = PoseMaker(robot, self._legs)
+        self._weights = LegWeights(foot=0.05)
         self._clearance = Clearance(robot, ClearanceSettings())
         arms = [*robot.chains["l_arm"], *robot.chains["r_arm"]]
         self._starts = []
@@ -104,35 +122,37 @@ class _Prover:
             self._starts.append(q)
 
     def both_feet(self, position: Array, yaw: float) -> bool:
-        return all(self._reaches(q, position, yaw, side) for q in self._starts for side in (0.0, 1.0))
+        """Whether every arm posture can be carried over either foot with the left sole there in the right one's frame.
 
-    def _reaches(self, q: Array, position: Array, yaw: float, offset: float, steps: int = 25) -> bool:
+        position: (2,) m. yaw: rad.
+        """
+        return all(self._reaches(q, position, yaw, side) for q in self._starts for side in (0, 1))
+
+    def _reaches(self, q: Array, position: Array, yaw: float, side: int) -> bool:
         """Move the left foot to its place, then the CoM over one foot; whether every constraint holds in the end."""
-        s = self._stabiliser
-        s.base_side = 1
-        s.plant(np.zeros((2, 3)), np.stack([np.eye(3), np.eye(3)]))
-        pose = s.pose(q.copy())
-        s.plant(pose.sole_pos * [1.0, 1.0, 0.0], np.stack([np.eye(3), np.eye(3)]))
-        pose = s.pose(q.copy())
-        feet = np.zeros((2, 3))
-        rows = self._stabiliser.legs.sole_joint + 1
-        start = pose.sole_pos[0].copy()
-        goal = pose.sole_pos[1] + [position[0], position[1], 0.0]
-        for k in range(2 * steps + 5):
-            part, shift = min(1.0, (k + 1) / steps), min(max(0.0, (k + 1 - steps) / steps), 1.0)
-            s.planted_pos[0] = start + part * (goal - start)
-            s.planted_rot[0] = yaw_matrix(part * yaw)
-            s.offset = 0.5 + shift * (offset - 0.5)
-            for i in (0, 1):
-                feet[i] = pose.link_pos[rows[i]] + pose.link_rot[rows[i]] @ s.legs.sole_point[i] - s.legs.hip[i]
-            self._clearance.look(pose)
-            plan = Plan(s.offset, 0.0, s.planted_pos[0], s.planted_rot[0], POSE, 0.0, False, False)
-            q_new = pose.q.copy()
-            _, closed = s.solve(q_new, plan, pose, feet, 1.0, (pose.q - 0.2, pose.q + 0.2), *self._clearance.leg_rows(pose, s.legs, 1))
-            if not closed:
+        pose = self._maker.stand(q)
+        start = pose.sole_pos * [1.0, 1.0, 0.0]
+        goal = start[1] + [position[0], position[1], 0.0]
+        for k in range(2 * STEPS + 5):
+            part, shift = min(1.0, (k + 1) / STEPS), min(max(0.0, (k + 1 - STEPS) / STEPS), 1.0)
+            soles = np.array([start[0] + part * (goal - start[0]), start[1]])
+            stepped = self._solved(pose, soles, part * yaw, 0.5 + shift * (side - 0.5))
+            if stepped is None:
                 return False
-            pose = s.pose(q_new)
-        left, right = s.centres(s.planted_pos, s.planted_rot)
-        over = (left if offset == 0.0 else right)[:2]
+            pose = stepped
+        over = self._maker.centres(pose.sole_pos, pose.sole_rot)[side]
         self._clearance.look(pose)
-        return bool(np.linalg.norm(pose.com[:2] - over) < COM_TOLERANCE and self._clearance.nearest > 0.0)
+        return bool(np.linalg.norm((pose.com - over)[:2]) < COM_TOLERANCE and self._clearance.nearest > 0.0)
+
+    def _solved(self, pose: Pose, soles: Array, yaw: float, offset: float) -> Pose | None:
+        """The pose with flat soles at (2, 3) m, the left one turned, and the CoM between them; None without one."""
+        rot = np.stack([yaw_matrix(yaw), np.eye(3)])
+        left, right = self._maker.centres(soles, rot)[:, :2]
+        goal = LegGoal(pose.soles_in_base - self._legs.hip, left + offset * (right - left), np.ones(2))
+        self._clearance.look(pose)
+        rows = self._clearance.leg_rows(pose, self._legs, 1)
+        q, stance = pose.q.copy(), Stance(1, soles, rot, POSE, 0.0)
+        _, closure, _ = solve_legs(
+            self._tree, self._legs, self._weights, stance, goal, q, pose.q - STEP, pose.q + STEP, *rows
+        )
+        return self._maker.hang(q, 1, soles, rot) if closure < CLOSED else None

@@ -53,6 +53,7 @@ class Stride:
         self.side = 1
         self._swing: Swing | None = None
         self._landed = False
+        self._good = self._can_stand_on_both()
 
     @property
     def mode(self) -> Mode:
@@ -82,6 +83,7 @@ class Stride:
         limit = self._law.acceleration(float(np.hypot(*(right - left)[:2])), float(pose.com[2]))
         offset, speed = advance(self.offset, self._offset_speed, target, dt, self._law, limit)
         if self._swing is None:
+            self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)
             other = 1 - self.side
             return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE)
         return self._swing_plan(self._swing, pose, footing, (offset, speed), dt)
@@ -104,7 +106,7 @@ class Stride:
         if plan.touchdown and scale == 1.0:
             foot = 1 - self.side
             self.planted_pos[foot], self.planted_rot[foot] = plan.sole_pos, plan.sole_rot
-            self._landed = True
+            self._landed, self._good = True, self._can_stand_on_both()
 
     def hold(self) -> None:
         """The plan was not taken: offset and swing start again from rest."""
@@ -130,7 +132,9 @@ class Stride:
 
     def _stance_ok(self) -> tuple[bool, bool]:
         """Whether the CoM can come over the left and the right foot with the soles where they are."""
+        return (True, True) if self._good else (self.offset < 0.5, self.offset >= 0.5)
+
+    def _can_stand_on_both(self) -> bool:
         yaw = heading(self.planted_rot[1])
         relative = yaw_matrix(-yaw)[:2, :2] @ (self.planted_pos[0] - self.planted_pos[1])[:2]
-        good = self.landing.contains(0, relative, wrap(heading(self.planted_rot[0]) - yaw))
-        return (True, True) if good else (self.offset < 0.5, self.offset >= 0.5)
+        return self.landing.contains(0, relative, wrap(heading(self.planted_rot[0]) - yaw))

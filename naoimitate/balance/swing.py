@@ -37,8 +37,10 @@ class SwingSettings:
     """[m/s] over the floor to the landing place."""
     descend_speed: float = 0.10
     """[m/s] straight down, at most."""
-    touch_speed: float = 0.02
+    touch_speed: float = 0.01
     """[m/s] at the floor."""
+    touch_height: float = 0.0003
+    """[m] above the floor at which the foot counts as carrying: servos that sag bring it down a moment early."""
     acceleration: float = 2.0
     """[m/s^2] of every part."""
     turn_speed: float = 2.5
@@ -129,6 +131,5 @@ class Swing:
         braking = math.sqrt(s.touch_speed**2 + 2.0 * s.acceleration * max(position[2], 0.0))
         speed = min(-self._velocity[2] + s.acceleration * dt, s.descend_speed, braking)
         self._velocity[:] = (0.0, 0.0, -speed)
-        height = position[2] - speed * dt
-        down = height < 1e-5
-        return np.array([self._start[0], self._start[1], 0.0 if down else height]), self._rotation, down
+        height = max(position[2] - speed * dt, 0.0)
+        return np.array([self._start[0], self._start[1], height]), self._rotation, height <= s.touch_height

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from naoimitate.core.frames import SEGMENT, HumanFrame
 from naoimitate.core.geometry import matrix_from_quat
 from naoimitate.human.body import Body, BodyState, observe
+from naoimitate.human.live_support import SupportEstimator
 from naoimitate.human.segments import center_of_mass
 
 Array = npt.NDArray[np.float64]
@@ -43,14 +44,14 @@ class Observer:
     def __init__(self, body: Body, tpose: HumanFrame) -> None:
         self._body = body
         self._last = tpose.landmarks.copy()
-        self._support = "D"
+        self._estimator = SupportEstimator()
         self._head_zero = (0.0, 0.0)
         self._head_zero = self._head(tpose, observe(body, tpose).torso)
 
-    def see(self, frame: HumanFrame, support: str) -> Observation:
-        """Observe a frame; landmarks that are missing or absurd keep their last good place relative to the pelvis.
+    def see(self, frame: HumanFrame, support: str | None = None) -> Observation:
+        """Observe a frame; landmarks that are missing or absurd keep their last good place relative to the others.
 
-        support: what the support estimate says of this frame.
+        support: the mode where the caller knows it; else the frame's own, else it is estimated.
         """
         landmarks, complete = self._bridged(frame.landmarks)
         frame = replace(frame, landmarks=landmarks)
@@ -60,7 +61,7 @@ class Observer:
         head = self._head(frame, state.torso)
         return Observation(
             state,
-            support,
+            support or frame.support or self._estimator.update(frame),
             com,
             (head[0] - self._head_zero[0], head[1] - self._head_zero[1]),
             self._hands(frame, state.torso),
