@@ -93,6 +93,7 @@ class PaperFeet:
         pose = self._planted.place(q, feet, footing)
         self._fsm, self._landed, self._side = SupportFsm(), False, 0
         self._offset, self._speed = self._planted.offset, 0.0
+        self._mapped = pose.q[self._legs.joints]
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
         return pose
 
@@ -114,10 +115,9 @@ class PaperFeet:
         centres = self._maker.centres(pose.sole_pos, pose.sole_rot)
         limit = self._law.acceleration(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]))
         offset, speed = advance(self._offset, self._speed, target, reach.dt, self._law, limit)
+        soles = self._mapped_soles(q_arms, feet)
+        com = self._in_base(q_arms)[1]
         q = q_arms.copy()
-        for limb, foot in zip(self._limbs, feet, strict=True):
-            solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        soles, com = self._in_base(q)
         side = self._base_side(soles, com, offset)
         soles, normal = self._retargeted(soles, com, offset, pose, reach.dt)
         turned = np.array([mode.stance != "R" or mode.landing, mode.stance != "L" or mode.landing])
@@ -144,6 +144,17 @@ class PaperFeet:
         swing_height = candidate.sole_pos[1 - side][2]
         self._landed = self.mode.landing and abs(swing_height) < TOUCHDOWN
         return Answer(candidate, GivenUp(0), iterations)
+
+    def _mapped_soles(self, q_arms: Array, feet: Array) -> Array:
+        """Centres of the soles (2, 3) m where the posture mapping puts them: it goes on from its own last answer, so
+        that the shifts of one frame do not add to those of the next."""
+        legs = self._legs.joints
+        q = q_arms.copy()
+        q[legs] = self._mapped
+        for limb, foot in zip(self._limbs, feet, strict=True):
+            solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
+        self._mapped = q[legs]
+        return self._in_base(q)[0]
 
     def _in_base(self, q: Array) -> tuple[Array, Array]:
         """Centres of the soles (2, 3) m and CoM (3,) m in the torso frame."""

@@ -52,7 +52,6 @@ class Stride:
         self.offset, self._offset_speed = offset, 0.0
         self.side = 1
         self._swing: Swing | None = None
-        self._landed = False
         self._good = self._can_stand_on_both()
 
     @property
@@ -71,7 +70,6 @@ class Stride:
         given = SupportInput(
             human=footing.support,
             offset=self.offset,
-            landed=self._landed,
             stance_ok=(True, True) if self.swinging else self._stance_ok(),
             ahead=footing.ahead,
             may_lift=footing.may_lift,
@@ -106,7 +104,8 @@ class Stride:
         if plan.touchdown and scale == 1.0:
             foot = 1 - self.side
             self.planted_pos[foot], self.planted_rot[foot] = plan.sole_pos, plan.sole_rot
-            self._landed, self._good = True, self._can_stand_on_both()
+            self._fsm.step(SupportInput(human="D", offset=self.offset, landed=True))
+            self._swing, self._good = None, self._can_stand_on_both()
 
     def hold(self) -> None:
         """The plan was not taken: offset and swing start again from rest."""
@@ -122,13 +121,10 @@ class Stride:
         return np.asarray((left + offset * (right - left))[:2])
 
     def _changed(self, before: Mode) -> None:
-        if not self.swinging:
-            self._swing, self._landed = None, False
-        elif before is Mode.DOUBLE:
+        if before is Mode.DOUBLE:
             self.side = 0 if self.mode.stance == "L" else 1
             foot = 1 - self.side
             self._swing = Swing(self.planted_pos[foot], self.planted_rot[foot], self._swing_settings)
-            self._landed = False
 
     def _stance_ok(self) -> tuple[bool, bool]:
         """Whether the CoM can come over the left and the right foot with the soles where they are."""

@@ -35,14 +35,16 @@ class SwingSettings:
     """[m/s] straight up."""
     approach_speed: float = 0.3
     """[m/s] over the floor to the landing place."""
-    descend_speed: float = 0.10
+    descend_speed: float = 0.06
     """[m/s] straight down, at most."""
     touch_speed: float = 0.01
     """[m/s] at the floor."""
-    touch_height: float = 0.0003
+    touch_height: float = 0.0004
     """[m] above the floor at which the foot counts as carrying: servos that sag bring it down a moment early."""
     acceleration: float = 2.0
-    """[m/s^2] of every part."""
+    """[m/s^2] up and over."""
+    descend_acceleration: float = 1.0
+    """[m/s^2] down: a soft end, after which the robot does not sway."""
     turn_speed: float = 2.5
     """[rad/s]."""
     arrived: float = 0.0005
@@ -128,8 +130,8 @@ class Swing:
 
     def _descend(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
         s = self.settings
-        braking = math.sqrt(s.touch_speed**2 + 2.0 * s.acceleration * max(position[2], 0.0))
-        speed = min(-self._velocity[2] + s.acceleration * dt, s.descend_speed, braking)
+        braking = math.sqrt(s.touch_speed**2 + 2.0 * s.descend_acceleration * max(position[2], 0.0))
+        speed = min(-self._velocity[2] + s.descend_acceleration * dt, s.descend_speed, braking)
         self._velocity[:] = (0.0, 0.0, -speed)
         height = max(position[2] - speed * dt, 0.0)
         return np.array([self._start[0], self._start[1], height]), self._rotation, height <= s.touch_height
