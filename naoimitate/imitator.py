@@ -21,7 +21,7 @@ from naoimitate.balance.stride import Stride
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import CalibrationError
 from naoimitate.core.frames import GivenUp, HumanFrame, RobotCommand
-from naoimitate.core.geometry import heading, quat_from_matrix, wrap, yaw_matrix
+from naoimitate.core.geometry import heading, quat_from_matrix
 from naoimitate.fsm import Mode
 from naoimitate.gate import Gate
 from naoimitate.human.observer import Observation, Observer
@@ -140,15 +140,9 @@ class Imitator:
         left, right = seen.body.foot_centres
         closest = self.settings.offset.min_feet_distance
         self._human_offset = normalised_offset(seen.com, left, right, self._human_offset, closest)
-        places = (self._landing_wish(seen, targets, 0), self._landing_wish(seen, targets, 1))
-        return Footing(seen.support, self._human_offset, places, seen.body.torso, ahead, may_lift)
-
-    def _landing_wish(self, seen: Observation, targets: Array, swing: int) -> tuple[Array, float]:
-        """Where the person's swing foot is, in the stance sole's frame, at the robot's scale: (2,) m and yaw, rad."""
-        stance = 1 - swing
-        between = targets[FEET[swing]] - targets[FEET[stance]] + self._hips[swing] - self._hips[stance]
-        yaw = heading(seen.body.feet[stance])
-        return (yaw_matrix(-yaw) @ seen.body.torso @ between)[:2], wrap(heading(seen.body.feet[swing]) - yaw)
+        between = targets[FEET[1]] - targets[FEET[0]] + self._hips[1] - self._hips[0]
+        yaws = (heading(seen.body.feet[0]), heading(seen.body.feet[1]))
+        return Footing(seen.support, self._human_offset, between, seen.body.torso, yaws, ahead, may_lift)
 
     def _missed(self, pose: Pose, seen: Observation, targets: Array, footing: Footing) -> GivenUp:
         """What the pose gave up against the person's posture, and for what."""

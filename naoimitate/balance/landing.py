@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 class LandingSet:
     """Relative sole poses, one convex polygon of positions for each yaw of a grid.
 
-    yaws: (Y,) rad, increasing: left sole's heading in the right sole's frame... see ``clip``.
+    yaws: (Y,) rad, increasing, Y >= 2: heading of the swing sole in the stance sole's frame.
     directions: (K, 2) outward unit normals. reach: (Y, K) m: position p is inside at yaw y when directions @ p <= reach.
     Given for the LEFT sole relative to the RIGHT one (frames: origin under the ankle); the other side is its mirror.
     """
@@ -35,7 +35,9 @@ class LandingSet:
         mirror = np.array([1.0, 1.0 if swing == 0 else -1.0])
         p, turn = position * mirror, yaw * mirror[1]
         allowed = float(min(max(turn, self.yaws[0]), self.yaws[-1]))
-        bound = np.array([np.interp(allowed, self.yaws, self.reach[:, k]) for k in range(len(self.directions))])
+        row = min(max(int(np.searchsorted(self.yaws, allowed)), 1), len(self.yaws) - 1)
+        part = (allowed - self.yaws[row - 1]) / (self.yaws[row] - self.yaws[row - 1])
+        bound = (1.0 - part) * self.reach[row - 1] + part * self.reach[row]
         x = np.empty(2)
         bounded_step(np.eye(2), np.ascontiguousarray(p), np.ascontiguousarray(-self.directions), -bound, 0, x)
         moved = bool(np.linalg.norm(x - p) > 1e-6 or abs(allowed - turn) > 1e-6)

@@ -107,7 +107,7 @@ class Planted:
         offset = {"L": 0.0, "R": 1.0}.get(footing.support, min(max(footing.offset, 0.0), 1.0))
         start = pose.sole_pos * [1.0, 1.0, 0.0]
         stride.restart(start, flat, offset)
-        place, turn, _ = stride.landing.clip(0, *footing.landing[0])
+        place, turn, _ = stride.landing.clip(0, *footing.landing(0))
         goal = start[1] + [place[0], place[1], 0.0]
         for k in range(PLACE_STEPS):
             part = min(1.0, 2.0 * (k + 1) / PLACE_STEPS)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from naoimitate.balance.legs import POSE, Legs, Stance, base_pose
 from naoimitate.balance.offset import normalised_offset
 from naoimitate.robot.kernel import center_of_mass, forward
-from naoimitate.robot.model import RobotModel
+from naoimitate.robot.model import RobotModel, Tree
 
 Array = npt.NDArray[np.float64]
 
@@ -46,15 +47,8 @@ class PoseMaker:
 
     def hang(self, q: Array, side: int, sole_pos: Array, sole_rot: Array) -> Pose:
         """The pose at q (J,) rad whose sole ``side`` is row ``side`` of poses (2, 3) m, (2, 3, 3) in the world."""
-        n = len(q)
-        link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
-        forward(self._robot.tree, q, link_pos, link_rot)
-        R, p, com = np.empty((3, 3)), np.empty(3), np.empty(3)
-        base_pose(self._robot.tree, self._legs, Stance(side, sole_pos, sole_rot, POSE, 0.0), link_pos, link_rot, R, p)
-        center_of_mass(self._robot.tree, link_pos, link_rot, com)
-        rows = self._legs.sole_joint + 1
-        soles = link_pos[rows] + np.einsum("kij,kj->ki", link_rot[rows], self._legs.sole_point)
-        return Pose(q, R, p, p + R @ com, p + soles @ R.T, R @ link_rot[rows], link_pos, link_rot)
+        parts = _hang(self._robot.tree, self._legs, q, side, sole_pos, sole_rot)
+        return Pose(q, *parts)
 
     def stand(self, q: Array) -> Pose:
         """The pose at q (J,) rad with the right sole flat at the origin of the floor."""
@@ -74,3 +68,22 @@ class PoseMaker:
         """Equation (6) for a pose; ``last`` where the feet are too close."""
         left, right = self.centres(pose.sole_pos, pose.sole_rot)
         return normalised_offset(pose.com, left, right, last)
+
+
+@njit(cache=True)
+def _hang(
+    tree: Tree, legs: Legs, q: Array, side: int, stance_pos: Array, stance_rot: Array
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
+    """Base rotation and position, CoM, soles' positions and rotations in the world; link frames in the base frame."""
+    n = q.shape[0]
+    link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
+    forward(tree, q, link_pos, link_rot)
+    R, p, com = np.empty((3, 3)), np.empty(3), np.empty(3)
+    base_pose(tree, legs, Stance(side, stance_pos, stance_rot, POSE, 0.0), link_pos, link_rot, R, p)
+    center_of_mass(tree, link_pos, link_rot, com)
+    sole_pos, sole_rot = np.empty((2, 3)), np.empty((2, 3, 3))
+    for k in range(2):
+        row = legs.sole_joint[k] + 1
+        sole_pos[k] = p + R @ (link_pos[row] + link_rot[row] @ legs.sole_point[k])
+        sole_rot[k] = R @ link_rot[row]
+    return R, p, p + R @ com, sole_pos, sole_rot, link_pos, link_rot

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from naoimitate.balance.pose import Pose
 from naoimitate.core.frames import GivenUp
+from naoimitate.core.geometry import wrap
 from naoimitate.fsm import Mode
 
 Array = npt.NDArray[np.float64]
@@ -19,17 +21,26 @@ Array = npt.NDArray[np.float64]
 class Footing:
     """What the human's feet ask for.
 
-    support: ``D``, ``L``, ``R`` or ``F``. offset: the human's, (6). landing: for a left and a right swing foot, its
-    wished position (2,) m and yaw (rad) in the stance sole's frame. torso: (3, 3) world from the human's torso.
-    ahead, may_lift: as in ``SupportInput``.
+    support: ``D``, ``L``, ``R`` or ``F``. offset: the human's, (6). between: (3,) m, from the left to the right sole in
+    the torso frame, at the robot's scale. torso: (3, 3) world from the human's torso. headings: (2,) rad of the human's
+    feet in the world. ahead, may_lift: as in ``SupportInput``.
     """
 
     support: str
     offset: float
-    landing: tuple[tuple[Array, float], tuple[Array, float]]
+    between: Array
     torso: Array
+    headings: tuple[float, float]
     ahead: str = ""
     may_lift: bool = True
+
+    def landing(self, swing: int) -> tuple[Array, float]:
+        """Where the person's foot ``swing`` (0 left, 1 right) is in the other sole's frame: (2,) m and yaw, rad."""
+        stance_yaw = self.headings[1 - swing]
+        way = self.torso @ (self.between if swing == 1 else -self.between)
+        c, s = math.cos(stance_yaw), math.sin(stance_yaw)
+        place = np.array([c * way[0] + s * way[1], c * way[1] - s * way[0]])
+        return place, wrap(self.headings[swing] - stance_yaw)
 
 
 @dataclass(frozen=True)

@@ -89,7 +89,7 @@ class Stride:
     def _swing_plan(self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float], dt: float) -> Plan:
         foot = 1 - self.side
         stance_yaw = heading(self.planted_rot[self.side])
-        place, turn, clipped = self.landing.clip(foot, *footing.landing[foot])
+        place, turn, clipped = self.landing.clip(foot, *footing.landing(foot))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
