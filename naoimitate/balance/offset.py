@@ -48,24 +48,31 @@ def normalised_offset(com: Array, left: Array, right: Array, last: float, min_di
     return float(((com[0] - left[0]) * dx + (com[1] - left[1]) * dy) / squared)
 
 
-def advance(offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, acceleration: float) -> tuple[float, float]:
+def advance(
+    offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, acceleration: float
+) -> tuple[float, float]:
     """One step of the offset towards its target: the speed law, and an acceleration bound, braking included.
 
     offset, target: normalised; velocity: 1/s; dt: s; acceleration: 1/s^2. Returns the new offset and velocity.
-    The offset never passes its target and never leaves [0, 1].
+    The offset never leaves [0, 1] and stops at its target without passing it. Only a target that jumps nearer than the
+    way to brake is passed and come back to: to stop dead would throw the ZMP.
     """
     distance = target - offset
-    limit = min(law.speed(offset), _braking_speed(abs(distance), acceleration, dt), abs(distance) / dt)
-    wanted = math.copysign(limit, distance)
+    wanted = math.copysign(min(law.speed(offset), _braking_speed(abs(distance), acceleration, dt)), distance)
     change = acceleration * dt
     velocity = min(max(wanted, velocity - change), velocity + change)
     moved = offset + velocity * dt
-    if (moved - target) * (offset - target) < 0.0 or abs(moved - target) < 1e-9:
-        return target, wanted if abs(distance) > 1e-9 else 0.0
-    return min(max(moved, 0.0), 1.0), velocity
+    if abs(moved - target) < 1e-9:
+        return target, velocity
+    return (moved, velocity) if 0.0 <= moved <= 1.0 else (min(max(moved, 0.0), 1.0), 0.0)
 
 
 def _braking_speed(distance: float, acceleration: float, dt: float) -> float:
-    """The speed from which a discrete bang of -acceleration stops within the distance."""
-    half = 0.5 * acceleration * dt
-    return math.sqrt(half * half + 2.0 * acceleration * distance) - half
+    """The speed from which steps of dt, each slower by acceleration * dt, end exactly at the distance.
+
+    With lengths in units of acceleration * dt^2, n + 1 such steps from speed v cover (n + 1) (v - n / 2).
+    """
+    unit = acceleration * dt
+    length = distance / (unit * dt)
+    n = math.floor((math.sqrt(8.0 * length + 1.0) - 1.0) / 2.0)
+    return unit * (length / (n + 1) + 0.5 * n)

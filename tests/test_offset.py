@@ -1,0 +1,109 @@
+"""The rate-limited offset: equation (6), the speed law, and the bound on its acceleration."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from naoimitate.balance.offset import GRAVITY, OffsetLaw, advance, normalised_offset
+
+LAW = OffsetLaw()
+FEET, COM_HEIGHT = 0.10, 0.26
+"""m: a stance of 10 cm under a CoM at 26 cm, as of a robot of 0.57 m."""
+LIMIT = LAW.acceleration(FEET, COM_HEIGHT)
+ROUNDING = 3e-9
+"""The offset snaps to a target that is nearer than 1e-9."""
+
+
+def travel(start: float, target: float, dt: float = 0.01, limit: float = LIMIT) -> np.ndarray:
+    """Offsets from rest until the target is reached, at most 10 s."""
+    path, velocity = [start], 0.0
+    while path[-1] != target and len(path) * dt < 10.0:
+        offset, velocity = advance(path[-1], velocity, target, dt, LAW, limit)
+        path.append(offset)
+    return np.array(path)
+
+
+def test_equation_6_by_hand() -> None:
+    left, right = np.array([0.0, 0.05]), np.array([0.0, -0.05])
+    assert normalised_offset(np.array([0.3, 0.05]), left, right, 0.7) == pytest.approx(0.0)
+    assert normalised_offset(np.array([0.3, -0.05]), left, right, 0.7) == pytest.approx(1.0)
+    assert normalised_offset(np.array([0.3, 0.0]), left, right, 0.7) == pytest.approx(0.5)
+    assert normalised_offset(np.array([0.0, -0.10]), left, right, 0.7) == pytest.approx(1.5), "not clamped"
+
+
+def test_equation_6_is_the_projection_on_the_line_between_oblique_feet() -> None:
+    left, right = np.array([0.1, 0.2]), np.array([0.4, -0.2])
+    across = np.array([0.4, 0.3])
+    for o in (-0.2, 0.0, 0.35, 1.0):
+        assert normalised_offset(left + o * (right - left) + 0.7 * across, left, right, 0.0) == pytest.approx(o)
+
+
+def test_last_value_is_kept_while_the_feet_are_closer_than_3_cm() -> None:
+    left = np.zeros(2)
+    assert normalised_offset(np.array([0.1, 0.0]), left, np.array([0.029, 0.0]), 0.42) == 0.42
+    assert normalised_offset(np.array([0.1, 0.0]), left, np.array([0.031, 0.0]), 0.42) != 0.42
+    assert normalised_offset(np.array([0.1, 0.0]), left, np.array([np.nan, 0.0]), 0.42) == 0.42
+
+
+def test_speed_law_is_a_parabola_that_leaves_the_borders() -> None:
+    assert LAW.speed(0.5) == pytest.approx(LAW.max_speed)
+    assert LAW.speed(0.0) == LAW.speed(1.0) == pytest.approx(LAW.min_speed)
+    assert LAW.speed(0.25) == pytest.approx(0.05 + 0.95 * 0.75)
+    assert LAW.speed(-0.3) == LAW.speed(1.4) == pytest.approx(LAW.min_speed)
+
+
+def test_acceleration_moves_the_zmp_by_at_most_10_mm() -> None:
+    """Linear inverted pendulum: the ZMP is off the CoM by z a / g, with a = d o''."""
+    for feet, height in ((0.05, 0.2), (0.10, 0.26), (0.3, 1.0)):
+        zmp_shift = height * feet * LAW.acceleration(feet, height) / GRAVITY
+        assert zmp_shift == pytest.approx(0.010)
+
+
+def test_centre_to_foot_takes_about_1_1_s_and_foot_to_foot_2_0_s() -> None:
+    assert 1.0 <= 0.01 * len(travel(0.5, 0.0)) <= 1.3
+    assert 1.0 <= 0.01 * len(travel(0.5, 1.0)) <= 1.3
+    assert 1.9 <= 0.01 * len(travel(0.0, 1.0)) <= 2.3
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0005, 0.05), st.floats(0.3, 20.0))
+@settings(max_examples=150, deadline=None)
+def test_a_fixed_target_is_reached_without_passing_it(start: float, target: float, dt: float, limit: float) -> None:
+    path = travel(start, target, dt, limit)
+    assert path[-1] == target
+    assert np.all(np.diff(path) * np.sign(target - start) >= 0.0)
+    assert path.min() >= min(start, target) and path.max() <= max(start, target)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0005, 0.05))
+@settings(max_examples=150, deadline=None)
+def test_a_fixed_target_is_reached_within_speed_law_and_acceleration(start: float, target: float, dt: float) -> None:
+    path = travel(start, target, dt)
+    speed = np.abs(np.diff(path)) / dt
+    assert np.all(speed <= np.array([LAW.speed(o) for o in path[:-1]]) + LIMIT * dt)
+    change = np.abs(np.diff(np.concatenate([[0.0], np.diff(path), [0.0]]) / dt))
+    assert np.all(change <= LIMIT * dt + ROUNDING / dt)
+
+
+@given(
+    st.floats(0.0, 1.0),
+    st.lists(st.tuples(st.floats(0.0, 1.0), st.integers(1, 60)), min_size=1, max_size=12),
+    st.floats(0.001, 0.05),
+    st.floats(0.5, 10.0),
+)
+@settings(max_examples=200, deadline=None)
+def test_jumping_targets_never_throw_the_offset(
+    start: float, targets: list[tuple[float, int]], dt: float, limit: float
+) -> None:
+    offset, velocity, last = start, 0.0, 0.0
+    for target, steps in targets:
+        for _ in range(steps):
+            moved, velocity = advance(offset, velocity, target, dt, LAW, limit)
+            speed = (moved - offset) / dt
+            assert 0.0 <= moved <= 1.0
+            assert abs(speed) <= LAW.max_speed + 1e-9
+            if moved not in (0.0, 1.0):
+                assert abs(speed - last) <= limit * dt + ROUNDING / dt, "the ZMP is thrown"
+            offset, last = moved, speed
