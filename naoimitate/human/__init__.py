@@ -1,0 +1,1 @@
+"""The person: segment masses, centre of mass, posture, support estimate, and a procedural person."""

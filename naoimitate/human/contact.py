@@ -17,6 +17,7 @@ from naoimitate.human.floor import SLOW, Floor, Mask, fit_floor
 
 MOVING = "M"
 """Raw class of a frame in which no foot is planted, but one is near the floor: it slides, pivots or rolls off."""
+_CLASSES = np.array([MOVING, "R", "L", "D", "F"])
 _FEET = [[LANDMARK[f"{side}_{name}"] for name in ("ankle", "toe")] for side in SIDES]
 _BODY = [row for name, row in LANDMARK.items() if name.split("_")[-1] not in ("ankle", "toe", "hand")]
 
@@ -97,10 +98,10 @@ def find_contacts(
 
 def classes(planted: Mask, heights: Array, rule: ContactRule) -> npt.NDArray[np.str_]:
     """``D``, ``L``, ``R``, ``F``, ``M`` of planted feet (..., 2) and heights of their points (..., 2, 3) m."""
-    left, right = planted[..., 0], planted[..., 1]
-    high = (np.where(np.isfinite(heights), heights, np.inf) > rule.flight).all(axis=(-1, -2))
-    high &= np.isfinite(heights).any(axis=(-1, -2))
-    return np.select([left & right, left, right, high], ["D", "L", "R", "F"], MOVING)
+    seen = np.isfinite(heights)
+    high = (~seen | (heights > rule.flight)).all(axis=(-1, -2)) & seen.any(axis=(-1, -2))
+    standing = planted @ np.array([2, 1])
+    return np.asarray(_CLASSES[np.where((standing == 0) & high, 4, standing)])
 
 
 def lowest(points: Array, landmarks: Array) -> Mask:

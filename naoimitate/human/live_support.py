@@ -51,6 +51,7 @@ class SupportEstimator:
         self._time = -np.inf
         self._points = np.full((2, 3, 3), np.nan)
         self._velocity = np.zeros((2, 3, 3))
+        self._speed = np.zeros((2, 3))
         self._touching = np.zeros(2, dtype=bool)
         self._planted = np.zeros(2, dtype=bool)
         self._changing = np.zeros(2)
@@ -75,32 +76,23 @@ class SupportEstimator:
         points = foot_points(frame.landmarks, self._rule.contact.tip)
         jumped = self._follow(points, dt)
         if not jumped:
-            resting = self._speed < SLOW
-            resting &= lowest(points[None], frame.landmarks[None])[0]
+            resting = (self._speed < SLOW) & lowest(points[None], frame.landmarks[None])[0]
             self._settle_floor(points[..., 2], resting, dt)
             self._judge(points, frame.contacts, dt)
         return self.mode
-
-    @property
-    def _speed(self) -> Array:
-        """(2, 3) m/s, NaN where a point is not seen."""
-        return np.where(np.isfinite(self._points[..., 0]), np.linalg.norm(self._velocity, axis=-1), np.nan)
 
     def _follow(self, points: Array, dt: float) -> bool:
         """Take the feet's new positions and filter their velocities; true when the source made them jump."""
         change = points - self._points
         self._points = points
         seen = np.isfinite(change)
-        if dt <= 0.0:
-            self._velocity[:] = 0.0
-            return False
-        measured = np.where(seen, change, 0.0) / dt
-        if (np.linalg.norm(measured, axis=-1) > self._rule.jump).any():
-            self._velocity[:] = 0.0
-            return True
+        measured = np.where(seen, change, 0.0) / dt if dt > 0.0 else np.zeros_like(change)
+        jumped = bool((np.abs(measured) > self._rule.jump).any())
         share = -np.expm1(-dt / self._rule.speed_time)
-        self._velocity = np.where(seen, self._velocity + share * (measured - self._velocity), 0.0)
-        return False
+        steady = seen & (dt > 0.0) & (not jumped)
+        self._velocity = np.where(steady, self._velocity + share * (measured - self._velocity), 0.0)
+        self._speed = np.where(np.isfinite(points[..., 0]), np.sqrt(np.square(self._velocity).sum(axis=-1)), np.nan)
+        return jumped
 
     def _settle_floor(self, z: Array, resting: Mask, dt: float) -> None:
         """Let the floor follow feet at heights z (2, 3) m that rest on it."""
@@ -108,7 +100,8 @@ class SupportEstimator:
         unknown = ~np.isfinite(self._floor)
         if self._unsupported > self._rule.lost and resting.any():
             unknown[:] = True
-        lower = np.nanmin(np.where(np.isfinite(z), z, np.inf), axis=0)
+        seen = np.isfinite(z)
+        lower = np.where(seen, z, np.inf).min(axis=0)
         self._floor = np.where(unknown & np.isfinite(lower), lower, self._floor)
         above = z - self._floor
         resting &= above < BAND
@@ -117,8 +110,8 @@ class SupportEstimator:
             self._floor += lowest_foot * -np.expm1(-dt / self._rule.rise)
         share = np.where(above < 0.0, -np.expm1(-dt / self._rule.sink), -np.expm1(-dt / self._rule.learn))
         self._floor = self._floor + np.where(resting, share * (z - self._floor), 0.0)
-        self._rested |= (resting & (np.abs(above) < REST)).all(axis=1)
-        self._floor = np.where(self._rested[:, None], self._floor, self._floor[::-1])
+        self._rested |= ((resting & (np.abs(above) < REST)) | ~seen).all(axis=1) & seen.any(axis=1)
+        self._floor = np.where((self._rested[::-1] & ~self._rested)[:, None], self._floor[::-1], self._floor)
         self._floor = np.minimum(self._floor, self._floor[::-1] + SIDES_DIFFER)
 
     def _judge(self, points: Array, contacts: Mask | None, dt: float) -> None:
@@ -126,8 +119,7 @@ class SupportEstimator:
         rule, tip = self._rule.contact, self._rule.contact.tip
         ankle, ball = self._floor[:, 0], self._floor[:, 1]
         heights = points[..., 2] - np.stack([ankle, ball, ball + tip * (ball - ankle)], axis=-1)
-        speed = self._speed
-        touching = rule.near(heights, speed) | (self._touching & rule.held(heights, speed))
+        touching = rule.near(heights, self._speed) | (self._touching & rule.held(heights, self._speed))
         seen = np.isfinite(heights).any(axis=-1)
         self._touching = np.where(seen, touching, self._touching) if contacts is None else np.asarray(contacts)
         changed = self._touching != self._planted
