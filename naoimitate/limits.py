@@ -65,35 +65,36 @@ class Follower:
 def follow(p: Array, v: Array, last: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> None:
     """One step of points p, v (K, 3) towards ``target``, whose previous value is ``last``; all three are updated.
 
-    Where the step to the target respects both bounds it is taken whole. Elsewhere the velocity is turned, within the
-    acceleration, towards the target's own velocity plus the speed from which the rest of the way can be braked.
+    The velocity is turned, within the acceleration, towards the target's own velocity plus the speed from which what
+    was left of the way can be braked: a target that keeps both bounds is followed exactly, a resting one is not passed.
     """
+    wanted = np.empty(3)
     for k in range(p.shape[0]):
-        change, need, gap = 0.0, 0.0, 0.0
+        gap = math.sqrt(((last[k] - p[k]) ** 2).sum())
+        approach = braking_speed(gap, max_acceleration, dt)
         for a in range(3):
-            step = (target[k, a] - p[k, a]) / dt
-            need += step * step
-            change += (step - v[k, a]) ** 2
-            gap += (target[k, a] - p[k, a]) ** 2
-        if need <= max_speed**2 and change <= (max_acceleration * dt) ** 2:
-            for a in range(3):
-                v[k, a] = (target[k, a] - p[k, a]) / dt
-                p[k, a] = target[k, a]
-                last[k, a] = target[k, a]
-            continue
-        gap = math.sqrt(gap)
-        half = 0.5 * max_acceleration * dt
-        approach = math.sqrt(half * half + 2.0 * max_acceleration * gap) - half
-        wanted = np.empty(3)
-        for a in range(3):
-            wanted[a] = (target[k, a] - last[k, a]) / dt + (approach * (target[k, a] - p[k, a]) / gap if gap > 0.0 else 0.0)
-            last[k, a] = target[k, a]
+            wanted[a] = (target[k, a] - last[k, a]) / dt + (approach * (last[k, a] - p[k, a]) / gap if gap > 0.0 else 0.0)
         _shorten(wanted, max_speed)
         turn = wanted - v[k]
         _shorten(turn, max_acceleration * dt)
         for a in range(3):
             v[k, a] += turn[a]
             p[k, a] += v[k, a] * dt
+            last[k, a] = target[k, a]
+            if abs(target[k, a] - p[k, a]) < 1e-12:
+                p[k, a] = target[k, a]
+
+
+@njit(cache=True)
+def braking_speed(distance: float, acceleration: float, dt: float) -> float:
+    """The speed from which steps of dt, each slower by acceleration * dt, end exactly at the distance.
+
+    With lengths in units of acceleration * dt^2, n + 1 such steps from speed v cover (n + 1) (v - n / 2).
+    """
+    unit = acceleration * dt
+    length = distance / (unit * dt)
+    n = math.floor((math.sqrt(8.0 * length + 1.0) - 1.0) / 2.0)
+    return unit * (length / (n + 1) + 0.5 * n)
 
 
 @njit(cache=True)

@@ -69,7 +69,7 @@ def test_centre_to_foot_takes_about_1_1_s_and_foot_to_foot_2_0_s() -> None:
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0005, 0.05), st.floats(0.3, 20.0))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_fixed_target_is_reached_without_passing_it(start: float, target: float, dt: float, limit: float) -> None:
     path = travel(start, target, dt, limit)
     assert path[-1] == target
@@ -78,7 +78,7 @@ def test_a_fixed_target_is_reached_without_passing_it(start: float, target: floa
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0005, 0.05))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_fixed_target_is_reached_within_speed_law_and_acceleration(start: float, target: float, dt: float) -> None:
     path = travel(start, target, dt)
     speed = np.abs(np.diff(path)) / dt
@@ -106,4 +106,4 @@ def test_jumping_targets_never_throw_the_offset(
             assert abs(speed) <= LAW.max_speed + 1e-9
             if moved not in (0.0, 1.0):
                 assert abs(speed - last) <= limit * dt + ROUNDING / dt, "the ZMP is thrown"
-            offset, last = moved, speed
+            offset, last = moved, 0.0 if moved in (0.0, 1.0) else speed

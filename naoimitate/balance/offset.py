@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.limits import braking_speed
+
 Array = npt.NDArray[np.float64]
 GRAVITY = 9.81
 """m/s^2."""
@@ -58,21 +60,10 @@ def advance(
     way to brake is passed and come back to: to stop dead would throw the ZMP.
     """
     distance = target - offset
-    wanted = math.copysign(min(law.speed(offset), _braking_speed(abs(distance), acceleration, dt)), distance)
+    wanted = math.copysign(min(law.speed(offset), braking_speed(abs(distance), acceleration, dt)), distance)
     change = acceleration * dt
     velocity = min(max(wanted, velocity - change), velocity + change)
     moved = offset + velocity * dt
     if abs(moved - target) < 1e-9:
         return target, velocity
     return (moved, velocity) if 0.0 <= moved <= 1.0 else (min(max(moved, 0.0), 1.0), 0.0)
-
-
-def _braking_speed(distance: float, acceleration: float, dt: float) -> float:
-    """The speed from which steps of dt, each slower by acceleration * dt, end exactly at the distance.
-
-    With lengths in units of acceleration * dt^2, n + 1 such steps from speed v cover (n + 1) (v - n / 2).
-    """
-    unit = acceleration * dt
-    length = distance / (unit * dt)
-    n = math.floor((math.sqrt(8.0 * length + 1.0) - 1.0) / 2.0)
-    return unit * (length / (n + 1) + 0.5 * n)
