@@ -222,6 +222,15 @@ def test_speed_is_measured_per_wall_clock_frame(robot: RobotModel) -> None:
     assert measures(halved, robot)["speed_over_limit"].value == pytest.approx(0.5)
 
 
+def test_a_joint_that_swings_to_and_fro_between_frames_rattles(robot: RobotModel) -> None:
+    run = standing(robot, 30)
+    q = run.q.copy()
+    q[10:20:2, robot.joint("LWristYaw")] += 0.02
+    assert measures(changed(run, q=q), robot)["rattle_frames"].value == 9
+    slow = run.q + 0.3 * np.sin(np.arange(30) * 0.2)[:, None]
+    assert measures(changed(run, q=slow), robot)["rattle_frames"].value == 0
+
+
 def test_an_arm_through_the_body_is_a_self_collision(robot: RobotModel) -> None:
     run = standing(robot, 30)
     q = run.q.copy()

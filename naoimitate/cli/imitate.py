@@ -82,7 +82,7 @@ def _choices(options: dict[str, Any]) -> dict[str, Any]:
     import hashlib
 
     from naoimitate.calib.subject import load_subject
-    from naoimitate.imitator import Settings
+    from naoimitate.settings import Settings
 
     settings = Settings(
         retarget=options["retarget"], hand_orientation=options["hand_orientation"], mirror=options["mirror"]

@@ -38,8 +38,9 @@ def write_pictures(
     from naoimitate.core.errors import RenderingUnavailable
     from naoimitate.sim.render import render_strip, render_video
 
-    moved = (run.sim_q, run.sim_base_pos, run.sim_base_quat)
-    q, base_pos, base_quat = (run.q, run.base_pos, run.base_quat) if run.sim_q is None else moved
+    q, base_pos, base_quat = run.q, run.base_pos, run.base_quat
+    if run.sim_q is not None and run.sim_base_pos is not None and run.sim_base_quat is not None:
+        q, base_pos, base_quat = run.sim_q, run.sim_base_pos, run.sim_base_quat
     written = []
     for render, path in ((render_strip, strip), (render_video, video)):
         if path is not None:

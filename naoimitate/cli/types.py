@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 
-class Number(click.ParamType):
+class Number(click.ParamType):  # type: ignore[type-arg]
     """A finite number within bounds, or one of some words."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Number(click.ParamType):
         return " or ".join((f"a number{bound}", *self._words))
 
 
-class OutputFile(click.ParamType):
+class OutputFile(click.ParamType):  # type: ignore[type-arg]
     """A file to be written: its folder must exist and be writable, so that long work is not lost at its end."""
 
     def __init__(self, metavar: str, *endings: str):

@@ -150,7 +150,9 @@ def as_png(figure: Figure, dpi: int = 110) -> bytes:
 
 
 def legend(axes: Axes, **options: Any) -> None:
-    """A legend in one line above the axes, where it hides nothing."""
+    """A legend in one line above the axes, where it hides nothing; none where nothing has a label."""
+    if not options and not axes.get_legend_handles_labels()[0]:
+        return
     axes.legend(ncol=9, loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1, frameon=False, **options)
 
 

@@ -208,7 +208,7 @@ def _bounded_step(H: Array, g: Array, damping: float, at: Array, lower: Array, u
             A[:, k] = 0.0
             b[k] = 0.0
         A[k, k] += damping
-    step = np.linalg.solve(A, b)
+    step: Array = np.linalg.solve(A, b)
     longest = np.abs(step).max()
     if longest > LONGEST_STEP:
         step *= LONGEST_STEP / longest

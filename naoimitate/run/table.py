@@ -9,7 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from naoimitate.balance.pose import Pose
+from naoimitate.balance.retarget import Answer, Retargeting
 from naoimitate.core.frames import Array, Motion
+from naoimitate.fsm import Mode
 from naoimitate.imitator import Imitator
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import Settings
@@ -45,20 +48,42 @@ class Table:
         ]
 
 
+class _Timed:
+    """A way of retargeting the feet that notes how long its last step took, s."""
+
+    def __init__(self, inner: Retargeting) -> None:
+        self._inner = inner
+        self.spent = 0.0
+
+    @property
+    def mode(self) -> Mode:
+        return self._inner.mode
+
+    @property
+    def offset(self) -> float:
+        return self._inner.offset
+
+    def place(self, *arguments: Any) -> Pose:
+        return self._inner.place(*arguments)
+
+    def step(self, *arguments: Any) -> Answer:
+        begin = clock.perf_counter()
+        answer = self._inner.step(*arguments)
+        self.spent = clock.perf_counter() - begin
+        return answer
+
+
 class _TimedImitator(Imitator):
-    """An imitator that notes how long the stabilisation of each frame takes."""
+    """An imitator that knows how long the stabilisation of its last frame took, s."""
 
     def __init__(self, robot: RobotModel, settings: Settings) -> None:
         super().__init__(robot, settings)
-        self.spent = 0.0
-        self._step_legs = self._retargeting.step
-        self._retargeting.step = self._timed_step  # type: ignore[method-assign]
+        self._timed = _Timed(self._retargeting)
+        self._retargeting = self._timed
 
-    def _timed_step(self, *arguments: Any) -> Any:
-        begin = clock.perf_counter()
-        answer = self._step_legs(*arguments)
-        self.spent = clock.perf_counter() - begin
-        return answer
+    @property
+    def spent(self) -> float:
+        return self._timed.spent
 
 
 def measure_steps(motion: Motion, robot: RobotModel, settings: Settings, rate: float) -> Table:
