@@ -16,6 +16,8 @@ Array = npt.NDArray[np.float64]
 SOLVED = 0
 INFEASIBLE = 1
 _TINY = 1e-12
+_NEGLIGIBLE = 1e-8
+"""Violation of a row that depends on the active ones which counts as rounding."""
 _MAX_CHANGES = 200
 
 
@@ -66,10 +68,10 @@ def bounded_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Arr
     active = np.empty(n, np.int64)
     sign = np.ones(k)
     u = np.zeros(n)
-    is_active = np.zeros(k, np.bool_)
+    is_active, is_redundant = np.zeros(k, np.bool_), np.zeros(k, np.bool_)
     size = 0
     for _ in range(_MAX_CHANGES):
-        p = _most_violated(C, b, equalities, x, is_active)
+        p = _most_violated(C, b, equalities, x, is_active | is_redundant)
         if p < 0:
             return SOLVED
         s = _row_value(C, p, x) - b[p]
@@ -85,6 +87,9 @@ def bounded_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Arr
             for i in range(size, n):
                 slope += d[i] * d[i]
             t2 = -s / slope if slope > _TINY else math.inf
+            if t2 == math.inf and u_p == 0.0 and s > -_NEGLIGIBLE:
+                is_redundant[p] = True
+                break
             t = min(t1, t2)
             if t == math.inf:
                 return INFEASIBLE
@@ -102,6 +107,7 @@ def bounded_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Arr
                 size += 1
                 break
             is_active[active[drop]] = False
+            is_redundant[:] = False
             size = _drop_row(R, J, active, u, drop, size)
     return INFEASIBLE
 
@@ -115,10 +121,10 @@ def _row_value(C: Array, i: int, x: Array) -> float:
 
 
 @njit(cache=True)
-def _most_violated(C: Array, b: Array, equalities: int, x: Array, is_active: Array) -> int:
+def _most_violated(C: Array, b: Array, equalities: int, x: Array, done: Array) -> int:
     worst, row = -1e-10, -1
     for i in range(C.shape[0]):
-        if is_active[i]:
+        if done[i]:
             continue
         s = _row_value(C, i, x) - b[i]
         if i < equalities:
