@@ -33,7 +33,7 @@ def test_the_report_is_one_file_with_every_measure_and_figure(robot: RobotModel,
     for measure in score_run(run, robot):
         assert html.escape(measure.label) in text
     for figure in FIGURES:
-        assert figure.caption in text
+        assert html.escape(figure.caption) in text
     assert "&lt;clip&gt; &amp; co.bvh" in text
     assert "src=" in text
     assert text.count("src=") == text.count('src="data:image/png;base64,')
