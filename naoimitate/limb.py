@@ -55,7 +55,8 @@ class LimbWeights(NamedTuple):
     null_damping: float = 0.001
     """[m/rad] below which a direction counts as one that the tip leaves free: elbow, orientation and rest act there."""
     damping: float = 0.004
-    """[m/rad], plus half of the error's own length (Sugihara 2011)."""
+    """[m/rad]. Its square grows by error times upper arm: as much as a stretched limb's way curves, or it would swing
+    about in front of a target that it cannot reach (the error's square alone, Sugihara 2011, is too little)."""
     tolerance: float = 1e-5
     """[m] of the tip's error below which the iteration stops."""
     iterations: float = 6.0
@@ -176,7 +177,7 @@ def solve_limb(
         for i in range(n):
             angles[i] = q[limb.joints[i]]
         limit_avoiding_weights(angles, x, limb.lower, limb.upper, weights)
-        damping = settings.damping**2 + 0.5 * length**2 * settings.damping
+        damping = settings.damping**2 + 0.5 * limb.upper_length * length
         for i in range(n):
             j = limb.joints[i]
             H[i, i] += damping * min(weights[i], 10.0)
