@@ -38,6 +38,7 @@ def demo(out: Path) -> None:
     make_folder(out)
     robot, person = load_robot("nao"), load_motion(MOTION)
     click.echo(f"{robot.name} {robot.version} imitates {MOTION}: {person.notes[0]}")
+    click.echo("(the first time this takes a minute longer, because functions are compiled)")
     with progress("imitating") as advance:
         run = imitate(person, robot, progress=advance)
     run = simulated(run, robot)
