@@ -47,6 +47,7 @@ class SupportInput:
     human: ``D``, ``L``, ``R`` or ``F`` (flight).
     offset: the robot's own normalised CoM offset, 0 over the left foot, 1 over the right.
     landed: the swing foot is down, flat, within tolerance.
+    descending: the swing foot is on its last way down, too low to go back.
     stance_ok: (left, right): with the soles where they are, the CoM can come over that foot. A foot that cannot carry
         is left by lifting it again.
     ahead: ``L`` or ``R`` when a recording tells that the human will stand on that foot soon: the offset goes there
@@ -57,6 +58,7 @@ class SupportInput:
     human: str
     offset: float
     landed: bool = False
+    descending: bool = False
     stance_ok: tuple[bool, bool] = (True, True)
     ahead: str = ""
     may_lift: bool = True
@@ -65,27 +67,28 @@ class SupportInput:
 def wanted_stance(mode: Mode, given: SupportInput) -> str:
     """The feet on which the robot should stand next: ``D``, ``L`` or ``R``.
 
-    The human's own, but for a foot that cannot carry where it is: then the other one, from which it is lifted and set
-    down again (re-lift). A flight changes nothing: one foot at least stays down.
+    The human's own, but for a foot that is needed, now or soon, and cannot carry where it is: then the other one, from
+    which it is lifted and set down again (re-lift). A flight changes nothing: one foot at least stays down.
     """
-    if given.human == "F":
-        return mode.stance
-    return _carrying(given.human, given) if mode is Mode.DOUBLE else given.human
+    if mode is not Mode.DOUBLE:
+        return mode.stance if given.human == "F" else given.human
+    if given.human in ("L", "R"):
+        return given.human if _can_carry(given.human, given) else _OTHER[given.human]
+    if given.ahead and not _can_carry(given.ahead, given):
+        return _OTHER[given.ahead]
+    return "D"
 
 
-def _carrying(foot: str, given: SupportInput) -> str:
-    can_carry = foot == "D" or given.stance_ok[0 if foot == "L" else 1]
-    return foot if can_carry else _OTHER[foot]
+def _can_carry(foot: str, given: SupportInput) -> bool:
+    return given.stance_ok[0 if foot == "L" else 1]
 
 
 def offset_target(mode: Mode, given: SupportInput, human_offset: float) -> float:
     """The offset to approach: forced to 0 or 1 for a single support, else the human's, clamped (section V-A)."""
-    stance = mode.stance
-    if mode is Mode.DOUBLE:
-        stance = wanted_stance(mode, given)
-        if stance == "D" and given.ahead:
-            stance = _carrying(given.ahead, given)
+    stance = wanted_stance(mode, given) if mode is Mode.DOUBLE else mode.stance
     if stance == "D":
+        stance = given.ahead
+    if not stance:
         return given.offset if given.human == "F" else min(max(human_offset, 0.0), 1.0)
     return 0.0 if stance == "L" else 1.0
 
@@ -96,7 +99,7 @@ def next_mode(mode: Mode, given: SupportInput) -> Mode:
     DOUBLE -> LEFT (RIGHT): the human stands on that foot and the offset has reached 0 (1): Fig. 4.
     LEFT -> LANDING_ON_LEFT: the human no longer stands on the left foot alone (in flight the robot stays).
     LANDING_ON_LEFT -> DOUBLE: the swing foot is down, flat, within tolerance; only then may the offset move.
-    LANDING_ON_LEFT -> LEFT: the human stands on the left foot again before the foot has landed.
+    LANDING_ON_LEFT -> LEFT: the human stands on the left foot again before the foot is on its last way down.
     """
     wanted = wanted_stance(mode, given)
     if mode is Mode.DOUBLE:
@@ -105,7 +108,7 @@ def next_mode(mode: Mode, given: SupportInput) -> Mode:
     if mode.landing:
         if given.landed:
             return Mode.DOUBLE
-        return _SINGLE[mode.stance] if given.human == mode.stance else mode
+        return _SINGLE[mode.stance] if given.human == mode.stance and not given.descending else mode
     return _LANDING[mode.stance] if wanted != mode.stance else mode
 
 

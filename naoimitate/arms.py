@@ -13,7 +13,8 @@ from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.pose import Pose
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.observer import Observation
-from naoimitate.limb import LimbWeights, build_limb, solve_limb, solve_limb_fixed
+from naoimitate.ik import SOLVED, bounded_step
+from naoimitate.limb import Limb, LimbWeights, build_limb, solve_limb, solve_limb_fixed
 from naoimitate.robot.kernel import forward
 from naoimitate.robot.model import RobotModel
 
@@ -87,13 +88,11 @@ class Arms:
         q, iterations = pose.q.copy(), 0
         self._frames += 1
         for side, limb in enumerate(self._limbs):
-            if self._paper is not None:
-                solve_limb_fixed(self._robot.tree, limb, targets[side], q, self._paper.damping, self._paper.arm_iterations)
-                q[limb.joints] = np.clip(q[limb.joints], low[limb.joints], high[limb.joints])
-                iterations += self._paper.arm_iterations
-                continue
             task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
             rows = clearance.limb_rows(pose, limb.joints)
+            if self._paper is not None:
+                iterations += self._as_published(self._paper, limb, targets[side], q, low, high, *rows)
+                continue
             if self._branch[side] is not None:
                 iterations += self._change_branch(side, q, task, low, high, rows)
                 continue
@@ -102,6 +101,18 @@ class Arms:
             if error > BRANCH_GAIN and self._frames % BRANCH_PERIOD == side:
                 iterations += self._look_for_branch(side, q, task, misfit)
         return q, iterations
+
+    def _as_published(self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array) -> int:
+        """The paper's iterations, then the nearest angles within speed, range and clear of the body (section V-D)."""
+        before = q[limb.joints]
+        solve_limb_fixed(self._robot.tree, limb, target, q, ik.damping, ik.arm_iterations)
+        wish, step, unit = q[limb.joints] - before, np.zeros(len(before)), np.eye(len(before))
+        down = np.minimum(np.maximum(low[limb.joints], limb.lower) - before, 0.0)
+        up = np.maximum(np.minimum(high[limb.joints], limb.upper) - before, 0.0)
+        within = np.concatenate([unit, -unit, rows]), np.concatenate([down, -up, bounds])
+        solved = bounded_step(unit, wish, *within, 0, step) == SOLVED
+        q[limb.joints] = before + (step if solved else 0.0)
+        return ik.arm_iterations
 
     def _look_for_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], misfit: float) -> int:
         """Start afresh from other postures; keep the best arm posture that fits clearly better."""

@@ -10,12 +10,17 @@ from numba import njit
 
 from naoimitate.balance.legs import Legs, add_cross, reduce_columns
 from naoimitate.balance.pose import Pose
-from naoimitate.collision import distances, lowest_points, shape_arrays
+from naoimitate.collision import BOX, ShapeArrays, distances, lowest_points, shape_arrays
 from naoimitate.robot.kernel import angular_jacobian, point_jacobian
 from naoimitate.robot.model import RobotModel, Tree
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+CORNER_REACH = 0.012
+"""[m] from the plane between two boxes within which their corners are watched."""
+MOST_CORNERS = 64
+"""Room for rows of corners; in the unlikely case of more, further pairs are left to the gate."""
 
 
 @dataclass(frozen=True)
@@ -65,14 +70,14 @@ class Clearance:
     def limb_rows(self, pose: Pose, joints: Ints) -> tuple[Array, Array]:
         """Rows (C, n) and bounds (C,) m for a limb whose joints (n,) move while the base stays."""
         return _limb_rows(
-            self._tree, joints, self._pairs, self._shapes.link, self._d, self._a, self._b, self._normal, self._lowest,
+            self._tree, joints, self._pairs, self._shapes, self._d, self._a, self._b, self._normal, self._lowest,
             self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._numbers,
         )  # fmt: skip
 
     def leg_rows(self, pose: Pose, legs: Legs, side: int) -> tuple[Array, Array]:
         """Rows (C, n) and bounds (C,) m for the legs, with the base hung on sole ``side``."""
         return _leg_rows(
-            self._tree, legs, side, self._pairs, self._shapes.link, self._d, self._a, self._b, self._normal, self._lowest,
+            self._tree, legs, side, self._pairs, self._shapes, self._d, self._a, self._b, self._normal, self._lowest,
             self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._numbers,
         )  # fmt: skip
 
@@ -88,22 +93,51 @@ def _bound(distance: float, safe: float, push: float) -> float:
 
 
 @njit(cache=True)
+def _contact_points(
+    shapes: ShapeArrays, pair: Ints, d: float, a: Array, b: Array, normal: Array, pos: Array, rot: Array, points: Array, gaps: Array
+) -> int:
+    """Points (17, 3) m at which two shapes must not come nearer, their gaps (17,) m along the normal, and their number.
+
+    One point is enough for round shapes. Two boxes that turn against each other would meet at corners far from it:
+    their corners near the plane between them are watched as well.
+    """
+    points[0], gaps[0], count = 0.5 * (a + b), d, 1
+    if shapes.kind[pair[0]] != BOX or shapes.kind[pair[1]] != BOX:
+        return count
+    for end in range(2):
+        s = pair[end]
+        row = shapes.link[s]
+        for corner in range(8):
+            local = shapes.p0[s].copy()
+            for k in range(3):
+                local[k] += shapes.half[s, k] * (1.0 if (corner >> k) & 1 else -1.0)
+            point = pos[row] + rot[row] @ local
+            gap = np.dot(normal, b - point) if end == 0 else np.dot(normal, point - a)
+            if gap < CORNER_REACH:
+                points[count], gaps[count] = point, gap
+                count += 1
+    return count
+
+
+@njit(cache=True)
 def _limb_rows(
-    tree: Tree, joints: Ints, pairs: Ints, link: Ints, d: Array, a: Array, b: Array, normal: Array, lowest: Array,
+    tree: Tree, joints: Ints, pairs: Ints, shapes: ShapeArrays, d: Array, a: Array, b: Array, normal: Array, lowest: Array,
     not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float, push: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     n, J = joints.shape[0], np.empty((3, tree.parent.shape[0]))
-    rows, bounds = np.zeros((pairs.shape[0] + lowest.shape[0], n)), np.empty(pairs.shape[0] + lowest.shape[0])
+    link, most = shapes.link, pairs.shape[0] + lowest.shape[0] + MOST_CORNERS
+    rows, bounds = np.zeros((most, n)), np.empty(most)
+    points, gaps = np.empty((17, 3)), np.empty(17)
     count = 0
     for p in range(pairs.shape[0]):
-        if d[p] > reach:
+        if d[p] > reach or count + 17 + lowest.shape[0] > most:
             continue
-        for end in range(2):
-            point, sign = (a[p], -1.0) if end == 0 else (b[p], 1.0)
-            point_jacobian(tree, pos, rot, link[pairs[p, end]] - 1, point, J)
-            for i in range(n):
-                rows[count, i] += sign * np.dot(normal[p], J[:, joints[i]])
-        count = _keep(rows, bounds, count, _bound(d[p], safe, push))
+        for k in range(_contact_points(shapes, pairs[p], d[p], a[p], b[p], normal[p], pos, rot, points, gaps)):
+            for end in range(2):
+                point_jacobian(tree, pos, rot, link[pairs[p, end]] - 1, points[k], J)
+                for i in range(n):
+                    rows[count, i] += (2.0 * end - 1.0) * np.dot(normal[p], J[:, joints[i]])
+            count = _keep(rows, bounds, count, _bound(gaps[k], safe, push))
     up = np.ascontiguousarray(base_rot[2])
     for s in range(lowest.shape[0]):
         if not not_foot[s] or lowest[s, 2] > reach:
@@ -127,22 +161,24 @@ def _keep(rows: Array, bounds: Array, count: int, bound: float) -> int:
 
 @njit(cache=True)
 def _leg_rows(
-    tree: Tree, legs: Legs, side: int, pairs: Ints, link: Ints, d: Array, a: Array, b: Array, normal: Array,
+    tree: Tree, legs: Legs, side: int, pairs: Ints, shapes: ShapeArrays, d: Array, a: Array, b: Array, normal: Array,
     lowest: Array, not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float, push: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     n, J = legs.joints.shape[0], np.empty((3, tree.parent.shape[0]))
-    rows, bounds = np.zeros((pairs.shape[0] + lowest.shape[0], n)), np.empty(pairs.shape[0] + lowest.shape[0])
+    link, most = shapes.link, pairs.shape[0] + lowest.shape[0] + MOST_CORNERS
+    rows, bounds = np.zeros((most, n)), np.empty(most)
+    points, gaps = np.empty((17, 3)), np.empty(17)
     Jp, Js, Ws = np.empty((3, n)), np.empty((3, n)), np.empty((3, n))
     count = 0
     for p in range(pairs.shape[0]):
-        if d[p] > reach:
+        if d[p] > reach or count + 17 + lowest.shape[0] > most:
             continue
-        for end in range(2):
-            point, sign = (a[p], -1.0) if end == 0 else (b[p], 1.0)
-            point_jacobian(tree, pos, rot, link[pairs[p, end]] - 1, point, J)
-            reduce_columns(J, legs, Jp)
-            rows[count] += sign * (np.ascontiguousarray(Jp.T) @ normal[p])
-        count = _keep(rows, bounds, count, _bound(d[p], safe, push))
+        for k in range(_contact_points(shapes, pairs[p], d[p], a[p], b[p], normal[p], pos, rot, points, gaps)):
+            for end in range(2):
+                point_jacobian(tree, pos, rot, link[pairs[p, end]] - 1, points[k], J)
+                reduce_columns(J, legs, Jp)
+                rows[count] += (2.0 * end - 1.0) * (np.ascontiguousarray(Jp.T) @ normal[p])
+            count = _keep(rows, bounds, count, _bound(gaps[k], safe, push))
     sole_row = legs.sole_joint[side] + 1
     sole = pos[sole_row] + rot[sole_row] @ legs.sole_point[side]
     point_jacobian(tree, pos, rot, legs.sole_joint[side], sole, J)

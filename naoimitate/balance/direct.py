@@ -6,10 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.legs import Legs
-from naoimitate.balance.paper import PaperIk, shortened, uncoupled_leg
+from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
+from naoimitate.balance.soles import shortened, uncoupled_leg
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, yaw_matrix
 from naoimitate.fsm import Mode
@@ -41,7 +42,7 @@ class Direct:
         q = q_arms.copy()
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._robot.tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        q = shortened(pose.q, q, reach)
+        q = shortened(pose.q, q, reach.low, reach.high)
         side = 1 if self.mode is Mode.RIGHT else 0
         hung = self._maker.hang(q, side, pose.sole_pos, pose.sole_rot)
         return Answer(self._upright(hung, pose, side, footing), GivenUp.BALANCE, 2 * self._ik.leg_iterations)

@@ -29,6 +29,8 @@ POSE = 0
 """The other sole follows a given pose exactly: planted, lifting, coming down."""
 FREE = 1
 """The other sole swings: its place in the torso frame and its level are tasks, its height a bound."""
+REACH = 2
+"""The other sole makes for a pose in the world, around whatever is in its way; its height is a bound."""
 
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
@@ -66,12 +68,20 @@ class LegWeights(NamedTuple):
     """Of the CoM's horizontal error: it outweighs the feet, so that balance is never traded for similarity."""
     foot: float = 1.0
     """Of the feet in the torso frame."""
+    com_slack: float = 0.010
+    """[m] of CoM error along x and y that nothing may exceed (or increase, where it is already larger)."""
+    reach: float = 20.0
+    """Of the sole's place in the world on its way to a landing."""
+    reach_turn: float = 2.0
+    """[m/rad] of its orientation then."""
     level: float = 0.02
-    """[m/rad] of the swing sole's orientation."""
+    """[m/rad] of the swing sole's orientation in free swing."""
     rest: float = 0.004
     """[m/rad] towards the rest posture: decides only what the rest leaves open."""
     damping: float = 0.002
-    """[m/rad] of the damped least squares."""
+    """[m/rad] of the damped least squares in the first step."""
+    damping_growth: float = 8.0
+    """Factor on the damping from step to step: later steps only close the loop, and cannot go to and fro."""
     iterations: float = 5.0
     """Largest number of Newton steps a frame."""
 
@@ -212,16 +222,15 @@ def solve_legs(
     R_wb, p_wb = np.empty((3, 3)), np.empty(3)
     J, x = np.empty((3, count)), np.empty(n)
     Js, Ws, Jo, Wo, Jc = np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty((3, n))
-    com, moved = np.empty(3), np.zeros(n)
+    com, moved, slack = np.empty(3), np.zeros(n), np.zeros(2)
     s, o = stance.side, 1 - stance.side
     equalities = 6 if stance.kind == POSE else 0
-    corners = legs.outline.shape[1] if stance.kind == FREE else 0
+    corners = legs.outline.shape[1] if stance.kind != POSE else 0
     tables = legs.table_x.shape[0]
-    C = np.zeros((equalities + 2 * n + 2 * tables + corners + rows.shape[0], n))
+    C = np.zeros((equalities + 4 + 2 * n + 2 * tables + corners + rows.shape[0], n))
     b = np.empty(C.shape[0])
     closure, com_error = 0.0, 0.0
-    limit = int(weights.iterations)
-    done = 0
+    limit, damping, done = int(weights.iterations), weights.damping, 0
     for iteration in range(limit + 1):
         forward(tree, q, pos, rot)
         base_pose(tree, legs, stance, pos, rot, R_wb, p_wb)
@@ -251,7 +260,8 @@ def solve_legs(
         _add_task(Jo, goal.feet[o] - (po - legs.hip[o]), weights.foot * goal.foot_weight[o], H, g)
         Jc -= Js
         add_cross(com - ps, Ws, Jc)
-        _add_task((R_wb @ Jc)[:2], e_com, weights.com, H, g)
+        Jcw = R_wb @ Jc
+        _add_task(Jcw[:2], e_com, weights.com, H, g)
         Jow = Jo - Js
         add_cross(po - ps, Ws, Jow)
         Jow, Wow = R_wb @ Jow, R_wb @ (Wo - Ws)
@@ -261,16 +271,24 @@ def solve_legs(
             C[:3], C[3:6] = Jow, Wow
             b[:3], b[3:6] = e_pos, e_rot
         else:
-            _add_task(Wow, e_rot, weights.level, H, g)
+            if stance.kind == REACH:
+                _add_task(Jow, e_pos, weights.reach, H, g)
+            _add_task(Wow, e_rot, weights.reach_turn if stance.kind == REACH else weights.level, H, g)
             for k in range(corners):
                 arm = R_wo[:, 0] * legs.outline[o, k, 0] + R_wo[:, 1] * legs.outline[o, k, 1]
                 for i in range(n):
                     C[row, i] = Jow[2, i] + arm[1] * Wow[0, i] - arm[0] * Wow[1, i]
                 b[row] = stance.min_height - ((p_wb + R_wb @ po)[2] + arm[2])
                 row += 1
+        for k in range(2):
+            if iteration == 0:
+                slack[k] = max(weights.com_slack, abs(e_com[k]))
+            C[row], b[row] = Jcw[k], e_com[k] - slack[k]
+            C[row + 1], b[row + 1] = -Jcw[k], -e_com[k] - slack[k]
+            row += 2
         for i in range(n):
             j = legs.joints[i]
-            H[i, i] += weights.damping**2 + weights.rest**2
+            H[i, i] += damping * damping + weights.rest**2
             g[i] += weights.rest**2 * (legs.rest[j] - q[j])
             C[row, i], b[row] = 1.0, max(q_low[j], min(legs.lower[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5)) - q[j]
             C[row + 1, i], b[row + 1] = -1.0, q[j] - min(q_high[j], max(legs.upper[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5))
@@ -285,6 +303,7 @@ def solve_legs(
         if bounded_step(H, g, C, b, equalities, x) != SOLVED:
             break
         done += 1
+        damping *= weights.damping_growth
         moved += x
         for j in range(count):
             if legs.variable[j] >= 0:

@@ -3,6 +3,10 @@
 In the torso frame the feet go where the mapping asks; in double support one of them is then shifted towards the CoM
 until the offset is met, and the soles are turned so that their normal points from the shifted offset point to the CoM.
 On a real floor the shifted foot drags; ``planted`` avoids that.
+
+What the paper leaves open: the mapping goes on from its own last answer (from the stabilised pose, the shifts of one
+frame would add to those of the next); a swing foot keeps off the floor, and comes down in a landing phase; feet that
+the legs cannot reach are asked for nearer to the stand, so that balance is never traded for similarity.
 """
 
 from __future__ import annotations
@@ -12,28 +16,28 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
-from naoimitate.balance.legs import LegLimits, Legs, reduce_columns, table_bounds
+from naoimitate.balance.legs import Legs
 from naoimitate.balance.offset import OffsetLaw, advance
-from naoimitate.balance.planted import Planted
+from naoimitate.balance.planted import SCALES, Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
+from naoimitate.balance.soles import into_tables, shortened, soles_and_com, solve_soles, uncoupled_leg, uncoupled_legs
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
 from naoimitate.gate import Gate
-from naoimitate.ik import damped_step, limit_avoiding_weights
-from naoimitate.limb import Limb, build_limb, solve_limb_fixed
-from naoimitate.robot.kernel import angular_jacobian, center_of_mass, forward, point_jacobian
-from naoimitate.robot.model import RobotModel, Tree
+from naoimitate.limb import solve_limb_fixed
+from naoimitate.robot.model import RobotModel
 
 Array = npt.NDArray[np.float64]
 
-STALLED = 1e-4
-"""[rad] of the largest joint step below which a solve has come as near as it can."""
 TOUCHDOWN = 0.005
 """[m] off the floor at which a landing foot counts as down: what 1 mm and 0.033 rad over 0.1 m between the feet leave."""
+SWING_CLEARANCE = 0.008
+"""[m] of a swing sole's lowest point above the floor: 5 mm, and what the tolerances of the solve take from it."""
+SHARE_SPEED = 1.0
+"""[1/s] at which the share of the mapped feet in the request grows, or shrinks while the legs cannot reach it."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +71,14 @@ def shift_factor(foot: Array, other: Array, com: Array, offset: float) -> float:
     return min((-b - root) / (2.0 * a), (-b + root) / (2.0 * a), key=abs)
 
 
+def shifted(soles: Array, com: Array, offset: float) -> Array:
+    """Section V-C 1: soles (2, 3) m with the left one shifted towards the CoM where o' < o, else the right one."""
+    left, right = soles
+    if offset < offset_in_space(left, right, com):
+        return np.array([left + shift_factor(left, right, com, offset) * (com - left), right])
+    return np.array([left, right + shift_factor(right, left, com, 1.0 - offset) * (com - right)])
+
+
 def up_vector(left: Array, right: Array, com: Array, offset: float) -> Array:
     """Equation (7): the soles' common normal n = p_CoM - (p_L + o' (p_R - p_L)), as a unit vector (3,)."""
     n = com - (left + offset * (right - left))
@@ -84,14 +96,15 @@ class PaperFeet:
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, gate: Gate, law: OffsetLaw, ik: PaperIk, foot_speed: float) -> None:
         self._tree, self._maker, self._planted, self._gate = robot.tree, maker, planted, gate
-        self._legs = _without_shared_joints(robot, legs)
-        self._law, self._ik, self._foot_speed = law, ik, foot_speed
+        self._legs = uncoupled_legs(robot, legs)
         self._limbs = [uncoupled_leg(robot, side) for side in "lr"]
+        self._law, self._ik, self._foot_speed = law, ik, foot_speed
+        self._stand = maker.stand(robot.postures["stand"]).soles_in_base - legs.hip
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """The stand of frame 0; see ``Planted.place``."""
         pose = self._planted.place(q, feet, footing)
-        self._fsm, self._landed, self._side = SupportFsm(), False, 0
+        self._fsm, self._landed, self._side, self._share = SupportFsm(), False, 0, 1.0
         self._offset, self._speed = self._planted.offset, 0.0
         self._mapped = pose.q[self._legs.joints]
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
@@ -109,155 +122,87 @@ class PaperFeet:
 
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: mapped feet, the offset of this frame, one foot shifted, both turned to the ground."""
-        given = SupportInput(footing.support, self._offset, self._landed, (True, True), footing.ahead, footing.may_lift)
-        mode = self._fsm.step(given)
-        target = offset_target(mode, given, footing.offset)
+        offset, speed = self._next_offset(pose, footing, reach.dt)
+        mapped = self._mapped_soles(q_arms, self._stand + self._share * (feet - self._stand))
+        soles, com = soles_and_com(self._tree, self._legs, q_arms)
+        single = self.mode is not Mode.DOUBLE and not self.mode.landing
+        places = self._raised(mapped, com, pose) if single else shifted(mapped, com, offset)
+        turned = np.array([self.mode.stance != "R" or self.mode.landing, self.mode.stance != "L" or self.mode.landing])
+        q, ik = q_arms.copy(), self._ik
+        used, _ = solve_soles(
+            self._tree, self._legs, places, up_vector(*places, com, offset), turned, q,
+            ik.damping, ik.position_tolerance, ik.angle_tolerance, ik.max_iterations,
+        )  # fmt: skip
+        way = float(np.linalg.norm(soles_and_com(self._tree, self._legs, q)[0] - soles, axis=1).max())
+        near = min(1.0, self._foot_speed * reach.dt / max(way, 1e-9))
+        self._hang_on(self._base_side(mapped, com, offset), pose)
+        q = shortened(pose.q, q_arms + near * (q - q_arms), reach.low, reach.high)
+        answer = self._taken(pose, q, (offset, speed), reach.dt, used + 2 * ik.leg_iterations)
+        flat = self._flat(answer.pose)
+        self._landed = self.mode.landing and flat
+        good = not answer.given_up and (single or flat or near < 1.0)
+        self._share = min(max(self._share + (SHARE_SPEED if good else -SHARE_SPEED) * reach.dt, 0.0), 1.0)
+        return answer
+
+    def _next_offset(self, pose: Pose, footing: Footing, dt: float) -> tuple[float, float]:
+        """The support machine takes its transition; the offset o' of this frame and its speed, 1/s (section V-A)."""
+        given = SupportInput(
+            human=footing.support, offset=self._offset, landed=self._landed, ahead=footing.ahead, may_lift=footing.may_lift
+        )
+        target = offset_target(self._fsm.step(given), given, footing.offset)
         centres = self._maker.centres(pose.sole_pos, pose.sole_rot)
         limit = self._law.acceleration(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]))
-        offset, speed = advance(self._offset, self._speed, target, reach.dt, self._law, limit)
-        soles = self._mapped_soles(q_arms, feet)
-        com = self._in_base(q_arms)[1]
-        q = q_arms.copy()
-        side = self._base_side(soles, com, offset)
-        soles, normal = self._retargeted(soles, com, offset, pose, reach.dt)
-        turned = np.array([mode.stance != "R" or mode.landing, mode.stance != "L" or mode.landing])
-        used = solve_soles(
-            self._tree, self._legs, soles, normal, turned, q, self._ik.damping,
-            self._ik.position_tolerance, self._ik.angle_tolerance, self._ik.max_iterations,
-        )  # fmt: skip
-        q = shortened(pose.q, q, reach)
-        return self._answer(pose, q, side, (offset, speed), reach.dt, used + 2 * self._ik.leg_iterations)
-
-    def _answer(self, pose: Pose, q: Array, side: int, offset: tuple[float, float], dt: float, iterations: int) -> Answer:
-        """Hang the pose flat on its stance sole, which stays where it was; hold where the gate refuses."""
-        if side != self._side:
-            self._side = side
-            self._stance_pos[side] = pose.sole_pos[side] * [1.0, 1.0, 0.0]
-            self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
-        candidate = self._maker.hang(q, side, self._stance_pos, self._stance_rot)
-        stances = (self.mode.stance != "R", self.mode.stance != "L")
-        fixed = (side == 0, side == 1)
-        if not self._gate.moves(candidate, pose, fixed, self._stance_pos, self._stance_rot, dt) or not self._gate.balanced(candidate, pose, stances):
-            self._speed = 0.0
-            return Answer(pose, GivenUp.HOLD, iterations)
-        self._offset, self._speed = offset
-        swing_height = candidate.sole_pos[1 - side][2]
-        self._landed = self.mode.landing and abs(swing_height) < TOUCHDOWN
-        return Answer(candidate, GivenUp(0), iterations)
+        return advance(self._offset, self._speed, target, dt, self._law, limit)
 
     def _mapped_soles(self, q_arms: Array, feet: Array) -> Array:
-        """Centres of the soles (2, 3) m where the posture mapping puts them: it goes on from its own last answer, so
-        that the shifts of one frame do not add to those of the next."""
-        legs = self._legs.joints
+        """Centres of the soles (2, 3) m in the torso frame where the posture mapping puts them."""
         q = q_arms.copy()
-        q[legs] = self._mapped
+        q[self._legs.joints] = self._mapped
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        self._mapped = q[legs]
-        return self._in_base(q)[0]
+        self._mapped = q[self._legs.joints]
+        return soles_and_com(self._tree, self._legs, q)[0]
 
-    def _in_base(self, q: Array) -> tuple[Array, Array]:
-        """Centres of the soles (2, 3) m and CoM (3,) m in the torso frame."""
-        n = len(q)
-        pos, rot, com = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3)), np.empty(3)
-        forward(self._tree, q, pos, rot)
-        center_of_mass(self._tree, pos, rot, com)
-        rows = self._legs.sole_joint + 1
-        centre = self._legs.sole_point + np.pad(self._legs.centre, ((0, 0), (0, 1)))
-        return pos[rows] + np.einsum("kij,kj->ki", rot[rows], centre), com
+    def _raised(self, soles: Array, com: Array, pose: Pose) -> Array:
+        """Single support: soles (2, 3) m with the swing foot off the floor, which is the plane of the stance sole."""
+        stance, swing = (0, 1) if self.mode.stance == "L" else (1, 0)
+        up = com - soles[stance]
+        up = up / np.linalg.norm(up)
+        corners = (self._legs.outline[swing] - self._legs.centre[swing]) @ pose.sole_rot[swing, 2, :2]
+        height = float((soles[swing] - soles[stance]) @ up)
+        raised = soles.copy()
+        raised[swing] += max(0.0, SWING_CLEARANCE - float(corners.min()) - height) * up
+        return raised
 
     def _base_side(self, soles: Array, com: Array, offset: float) -> int:
-        """The foot that is not shifted: the right one when o' < o_R, else the left one; in single support the stance."""
+        """The foot that is not shifted: the right one when o' < o, else the left one; in single support the stance."""
         if self.mode is not Mode.DOUBLE:
             return 0 if self.mode.stance == "L" else 1
         return 1 if offset < offset_in_space(soles[0], soles[1], com) else 0
 
-    def _retargeted(self, soles: Array, com: Array, offset: float, pose: Pose, dt: float) -> tuple[Array, Array]:
-        """Section V-C: new places (2, 3) m of the soles' centres in the torso frame, and their normal (3,)."""
-        soles = soles.copy()
-        if self.mode is not Mode.DOUBLE and not self.mode.landing:
-            return soles, up_vector(soles[0], soles[1], com, offset)
-        if offset < offset_in_space(soles[0], soles[1], com):
-            soles[0] += shift_factor(soles[0], soles[1], com, offset) * (com - soles[0])
-        else:
-            soles[1] += shift_factor(soles[1], soles[0], com, 1.0 - offset) * (com - soles[1])
-        normal = up_vector(soles[0], soles[1], com, offset)
-        if self.mode.landing:
-            swing = 1 if self.mode.stance == "L" else 0
-            now = self._in_base(pose.q)[0][swing]
-            way = soles[swing] - now
-            soles[swing] = now + way * min(1.0, self._foot_speed * dt / max(float(np.linalg.norm(way)), 1e-9))
-        return soles, normal
+    def _hang_on(self, side: int, pose: Pose) -> None:
+        """From now on the robot hangs on sole ``side``, flat where it is."""
+        if side != self._side:
+            self._side = side
+            self._stance_pos[side] = pose.sole_pos[side] * [1.0, 1.0, 0.0]
+            self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
 
+    def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float, iterations: int) -> Answer:
+        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first."""
+        stances = (self.mode.stance != "R", self.mode.stance != "L")
+        for part in SCALES:
+            q_part = pose.q + part * (q - pose.q)
+            into_tables(self._legs, q_part)
+            candidate = self._maker.hang(q_part, self._side, self._stance_pos, self._stance_rot)
+            if self._gate.passes(candidate, pose, stances, candidate.sole_pos, candidate.sole_rot, dt):
+                self._offset += part * (offset[0] - self._offset)
+                self._speed = offset[1] if part == 1.0 else 0.0
+                return Answer(candidate, GivenUp(0), iterations)
+        self._speed = 0.0
+        return Answer(pose, GivenUp.HOLD, iterations)
 
-def uncoupled_leg(robot: RobotModel, side: str) -> Limb:
-    """A leg whose shared joints are held, so that one leg's solution does not move the other."""
-    limb = build_limb(robot, f"{side}_leg", LegLimits().range_reserve)
-    joints = {j for pair in robot.coupled for j in pair}
-    keep = np.array([j not in joints for j in limb.joints])
-    return limb._replace(joints=limb.joints[keep], lower=limb.lower[keep], upper=limb.upper[keep], rest=limb.rest[keep])
-
-
-def _without_shared_joints(robot: RobotModel, legs: Legs) -> Legs:
-    """The legs with their shared joints held: the paper's problem of 5 degrees of freedom a foot."""
-    shared = {j for pair in robot.coupled for j in pair}
-    joints = np.array([j for j in legs.joints if j not in shared], dtype=np.int64)
-    variable = np.full_like(legs.variable, -1)
-    variable[joints] = np.arange(len(joints))
-    return legs._replace(variable=variable, joints=joints)
-
-
-def shortened(before: Array, q: Array, reach: Reach) -> Array:
-    """The longest part of a joint step that no joint's speed limit forbids."""
-    step = q - before
-    room = np.where(step > 0.0, reach.high - before, before - reach.low)
-    part = float(np.min(np.where(np.abs(step) > room, room / np.maximum(np.abs(step), 1e-12), 1.0)))
-    return np.asarray(before + part * step)
-
-
-@njit(cache=True)
-def solve_soles(
-    tree: Tree, legs: Legs, places: Array, normal: Array, turned: Array, q: Array, damping: float, near: float, angle: float, limit: int
-) -> int:
-    """Damped least squares on both legs until every sole centre is within ``near`` m and ``angle`` rad; q is written.
-
-    places: (2, 3) m in the torso frame; normal: (3,) of the soles that are ``turned`` (2,) bool. Returns the iterations.
-    """
-    n, count = legs.joints.shape[0], q.shape[0]
-    pos, rot = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
-    J, A, e = np.empty((3, count)), np.zeros((12, n)), np.zeros(12)
-    angles, lower, upper = np.empty(n), np.empty(n), np.empty(n)
-    weights, step = np.ones(n), np.zeros(n)
-    for iteration in range(limit):
-        forward(tree, q, pos, rot)
-        worst_place, worst_turn = 0.0, 0.0
-        for k in range(2):
-            row = legs.sole_joint[k] + 1
-            local = legs.sole_point[k] + np.array([legs.centre[k, 0], legs.centre[k, 1], 0.0])
-            centre = pos[row] + rot[row] @ local
-            e[6 * k : 6 * k + 3] = places[k] - centre
-            point_jacobian(tree, pos, rot, legs.sole_joint[k], centre, J)
-            reduce_columns(J, legs, A[6 * k : 6 * k + 3])
-            worst_place = max(worst_place, np.linalg.norm(e[6 * k : 6 * k + 3]))
-            if turned[k]:
-                e[6 * k + 3 : 6 * k + 6] = np.cross(rot[row][:, 2], normal)
-                angular_jacobian(tree, pos, rot, legs.sole_joint[k], J)
-                reduce_columns(J, legs, A[6 * k + 3 : 6 * k + 6])
-                worst_turn = max(worst_turn, np.linalg.norm(e[6 * k + 3 : 6 * k + 6]))
-        if worst_place < near and worst_turn < angle:
-            return iteration
-        for i in range(n):
-            j = legs.joints[i]
-            angles[i], lower[i], upper[i] = q[j], legs.lower[j], legs.upper[j]
-        limit_avoiding_weights(angles, step, lower, upper, weights)
-        step[:] = damped_step(A, e, weights, damping)
-        for j in range(count):
-            v = legs.variable[j]
-            if v >= 0:
-                q[j] = min(max(q[j] + step[v], legs.lower[j]), legs.upper[j])
-        for t in range(legs.table_x.shape[0]):
-            low, _, high, _ = table_bounds(legs.table_rows[t], q[legs.table_x[t]])
-            q[legs.table_y[t]] = min(max(q[legs.table_y[t]], low), high)
-        if np.abs(step).max() < STALLED:
-            return iteration + 1
-    return limit
+    def _flat(self, pose: Pose) -> bool:
+        """Whether the sole on which the robot does not hang lies on the floor as well."""
+        other = 1 - self._side
+        height, tilt = pose.sole_pos[other, 2], np.linalg.norm(pose.sole_rot[other, 2, :2])
+        return bool(abs(height) < TOUCHDOWN and tilt < self._ik.angle_tolerance)

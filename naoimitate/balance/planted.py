@@ -34,6 +34,8 @@ PLACE_STEP = 0.1
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
+LANDING_WEIGHT = 0.05
+"""Of the stance foot's target while the other one lands: the torso gives way, as in the proof of the landing set."""
 
 
 class Planted:
@@ -76,7 +78,7 @@ class Planted:
         stride, other = self._stride, 1 - self._stride.side
         pos, rot = stride.planted_pos.copy(), stride.planted_rot.copy()
         pos[other], rot[other] = plan.sole_pos, plan.sole_rot
-        if plan.kind == POSE and scale < 1.0:
+        if plan.kind != FREE and scale < 1.0:
             start, turn = pose.sole_pos[other], rotation_vector(plan.sole_rot @ pose.sole_rot[other].T)
             pos[other] = start + scale * (plan.sole_pos - start)
             rot[other] = matrix_from_rotation_vector(scale * turn) @ pose.sole_rot[other]
@@ -85,6 +87,7 @@ class Planted:
             near = max(0.0, 1.0 - max(pose.sole_pos[other][2], 0.0) / LEVEL_BELOW)
             weights = weights._replace(level=weights.level * (1.0 + LEVEL_GAIN * near))
         elif stride.swinging:
+            foot_weight[:] = (LANDING_WEIGHT, LANDING_WEIGHT) if stride.mode.landing else (1.0, 1.0)
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
         goal = LegGoal(feet, stride.com_goal(offset), foot_weight)
@@ -93,8 +96,13 @@ class Planted:
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side)
-        done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, goal, q, reach.low, reach.high, *rows)
-        return done, plan.kind == FREE or closure < CLOSED
+        for bounds in (rows[1], np.minimum(rows[1], 0.0)):
+            done, closure, _ = solve_legs(
+                self._tree, self._legs, weights, stance, goal, q, reach.low, reach.high, rows[0], bounds
+            )
+            if done > 0:
+                break
+        return done, done > 0 and (plan.kind != POSE or closure < CLOSED)
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.

@@ -8,15 +8,17 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.landing import LandingSet
-from naoimitate.balance.legs import FREE, POSE
+from naoimitate.balance.legs import FREE, POSE, REACH
 from naoimitate.balance.offset import OffsetLaw, advance
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Footing
-from naoimitate.balance.swing import Swing, SwingSettings
+from naoimitate.balance.swing import Phase, Swing, SwingSettings
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
 
 Array = npt.NDArray[np.float64]
+
+_KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
 
 
 @dataclass(frozen=True)
@@ -70,6 +72,7 @@ class Stride:
         given = SupportInput(
             human=footing.support,
             offset=self.offset,
+            descending=self._swing is not None and self._swing.phase is Phase.DESCEND,
             stance_ok=(True, True) if self.swinging else self._stance_ok(),
             ahead=footing.ahead,
             may_lift=footing.may_lift,
@@ -94,7 +97,7 @@ class Stride:
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
-        kind = POSE if swing.fixed_pose else FREE
+        kind = _KINDS[swing.phase]
         return Plan(*offset, position, rotation, kind, swing.min_height, down, clipped and self.mode.landing)
 
     def accept(self, plan: Plan, scale: float) -> None:
@@ -131,6 +134,10 @@ class Stride:
         return (True, True) if self._good else (self.offset < 0.5, self.offset >= 0.5)
 
     def _can_stand_on_both(self) -> bool:
-        yaw = heading(self.planted_rot[1])
-        relative = yaw_matrix(-yaw)[:2, :2] @ (self.planted_pos[0] - self.planted_pos[1])[:2]
-        return self.landing.contains(0, relative, wrap(heading(self.planted_rot[0]) - yaw))
+        """Whether the stance is in the landing set, seen from either foot (its polygons are not quite symmetric)."""
+        return any(self._in_landing_set(swing) for swing in (0, 1))
+
+    def _in_landing_set(self, swing: int) -> bool:
+        yaw = heading(self.planted_rot[1 - swing])
+        way = yaw_matrix(-yaw) @ (self.planted_pos[swing] - self.planted_pos[1 - swing])
+        return self.landing.contains(swing, way[:2], wrap(heading(self.planted_rot[swing]) - yaw))

@@ -13,6 +13,9 @@ from naoimitate.core.geometry import matrix_from_rotation_vector, rotation_vecto
 
 Array = npt.NDArray[np.float64]
 
+OVERHEAD = 0.001
+"""[m] by which a foot may be lower than its way to the landing place asks, so that bound and way never fight."""
+
 
 class Phase(enum.Enum):
     """Parts of a swing."""
@@ -47,8 +50,8 @@ class SwingSettings:
     """[m/s^2] down: a soft end, after which the robot does not sway."""
     turn_speed: float = 2.5
     """[rad/s]."""
-    arrived: float = 0.0005
-    """[m] and [rad * 0.1 m]: the foot is over its landing place."""
+    arrived: float = 0.001
+    """[m] and [rad * 0.1 m]: the foot is over its landing place, close enough to go straight down."""
 
 
 class Swing:
@@ -64,11 +67,6 @@ class Swing:
         self._velocity = np.zeros(3)
         self._start = position.copy()
         self._rotation = rotation.copy()
-
-    @property
-    def fixed_pose(self) -> bool:
-        """Whether the sole follows a pose exactly (everywhere but in free swing)."""
-        return self.phase is not Phase.FREE
 
     def step(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float) -> tuple[Array, Array, bool]:
         """The sole pose to ask for next.
@@ -101,6 +99,7 @@ class Swing:
 
     def _approach(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, dt: float) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
+        self.min_height = min(self.settings.clearance - OVERHEAD, self.min_height + self.settings.lift_speed * dt)
         target = np.array([goal[0], goal[1], self.settings.clearance])
         level = yaw_matrix(goal_yaw)
         turn = rotation_vector(level @ rotation.T)
@@ -109,7 +108,7 @@ class Swing:
             self.phase = Phase.DESCEND
             self._start, self._rotation = target, level
             self._velocity[:] = 0.0
-            return self._descend(target, dt)
+            return self._descend(position, dt)
         step = self._braked(way, dt)
         part = min(1.0, self.settings.turn_speed * dt / angle) if angle > 0.0 else 1.0
         return position + step, matrix_from_rotation_vector(part * turn) @ rotation, False
