@@ -110,13 +110,23 @@ def observe(body: Body, frame: HumanFrame) -> BodyState:
     )
     p = np.ascontiguousarray(frame.landmarks, dtype=np.float64)
     for side in (0, 1):
-        given = None if frame.orientations is None else frame.orientations[_FEET[side]]
-        if given is not None and np.isfinite(given).all():
-            state.feet[side] = matrix_from_quat(np.ascontiguousarray(given))
+        given = rotation_of(frame, _FEET[side])
+        if given is not None:
+            state.feet[side] = given
         else:
             _foot_frame(p[_ANKLES[side]], p[_TOES[side]], p[_KNEES[side]], body.toe_pitch[side], state.feet[side])
     _observe(p, body.ankle_height, state.posture, state.torso, state.mid_hip, state.soles, state.feet, state.foot_centres, state.elbows)
     return state
+
+
+def rotation_of(frame: HumanFrame, segment: int) -> Array | None:
+    """Rotation (3, 3) world from segment; None where the frame has none, or a quaternion far from unit length."""
+    if frame.orientations is None:
+        return None
+    quaternion = np.ascontiguousarray(frame.orientations[segment], dtype=np.float64)
+    if not 0.1 < np.abs(quaternion).max() < 10.0:
+        return None
+    return np.asarray(matrix_from_quat(quaternion))
 
 
 @njit(cache=True)

@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.core.frames import SEGMENT, HumanFrame
-from naoimitate.core.geometry import matrix_from_quat
-from naoimitate.human.body import Body, BodyState, observe
+from naoimitate.human.body import Body, BodyState, observe, rotation_of
 from naoimitate.human.live_support import SupportEstimator
 from naoimitate.human.segments import center_of_mass
 
@@ -56,8 +55,8 @@ class Observer:
         landmarks, complete = self._bridged(frame.landmarks)
         frame = replace(frame, landmarks=landmarks)
         state = observe(self._body, frame)
-        com = frame.com if frame.com is not None and np.isfinite(frame.com).all() else center_of_mass(landmarks)
-        opening = np.full(2, np.nan) if frame.hand_opening is None else frame.hand_opening
+        com = frame.com if frame.com is not None and _possible(frame.com).all() else center_of_mass(landmarks)
+        opening = np.full(2, np.nan) if frame.hand_opening is None else np.clip(frame.hand_opening, 0.0, 1.0)
         head = self._head(frame, state.torso)
         return Observation(
             state,
@@ -70,30 +69,30 @@ class Observer:
         )
 
     def _bridged(self, landmarks: Array) -> tuple[Array, bool]:
-        good = np.isfinite(landmarks).all(axis=1) & (np.abs(np.nan_to_num(landmarks)) < MAX_COORDINATE).all(axis=1)
+        good = _possible(landmarks).all(axis=1)
         if good.all():
-            self._last = landmarks
-            return np.ascontiguousarray(landmarks), True
+            self._last = np.array(landmarks, dtype=np.float64)
+            return self._last, True
         moved = (landmarks[good] - self._last[good]).mean(axis=0) if good.any() else np.zeros(3)
         filled = np.where(good[:, None], landmarks, self._last + moved)
         self._last = filled
         return filled, False
 
-    @staticmethod
-    def _rotation(frame: HumanFrame, segment: str) -> Array | None:
-        if frame.orientations is None or not np.isfinite(frame.orientations[SEGMENT[segment]]).all():
-            return None
-        return np.asarray(matrix_from_quat(np.ascontiguousarray(frame.orientations[SEGMENT[segment]])))
-
     def _head(self, frame: HumanFrame, torso: Array) -> tuple[float, float]:
-        R = self._rotation(frame, "head")
+        R = rotation_of(frame, SEGMENT["head"])
         if R is None:
             return self._head_zero
         x = torso.T @ R[:, 0]
         return math.atan2(x[1], x[0]), math.atan2(-x[2], math.hypot(x[0], x[1]))
 
-    def _hands(self, frame: HumanFrame, torso: Array) -> Array | None:
-        found = [self._rotation(frame, f"{s}_hand") for s in "lr"]
+    @staticmethod
+    def _hands(frame: HumanFrame, torso: Array) -> Array | None:
+        found = [rotation_of(frame, SEGMENT[f"{s}_hand"]) for s in "lr"]
         if found[0] is None or found[1] is None:
             return None
         return np.array([torso.T @ found[0], torso.T @ found[1]])
+
+
+def _possible(places: Array) -> npt.NDArray[np.bool_]:
+    """Which coordinates (m) can be a person's."""
+    return np.asarray(np.abs(np.where(np.isfinite(places), places, np.inf)) < MAX_COORDINATE)
