@@ -25,7 +25,7 @@ from naoimitate.core.geometry import heading, quat_from_matrix
 from naoimitate.fsm import Mode
 from naoimitate.gate import Gate
 from naoimitate.human.observer import Observation, Observer
-from naoimitate.limits import Follower
+from naoimitate.limits import Follower, limited_step
 from naoimitate.mapping import Mapping, reachable_mapping, virtual_mapping
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import Settings
@@ -108,15 +108,26 @@ class Imitator:
         turn = self.robot.speed * (self.settings.limits.joint_share * dt)
         reach = Reach(dt, pose.q - turn, pose.q + turn)
         hands = self._hands.step(targets[HANDS], dt)
-        feet = self._feet.step(targets[FEET], dt)
+        feet = self._feet_step(pose, targets, dt)
         self._clearance.look(pose)
         q, arm_iterations = self._arms.solve(pose, hands, seen, reach.low, reach.high, self._clearance)
         self._arms.head(q, seen.head, self.settings.limits.head_speed * dt, reach.low, reach.high)
         answer = self._retargeting.step(pose, q, feet, footing, reach)
         self._pose = answer.pose
+        self._feet_velocity = (answer.pose.soles_in_base - pose.soles_in_base) / dt
         if GivenUp.HOLD in answer.given_up:
             self._stand_still()
         return answer.given_up | self._missed(answer.pose, seen, targets, footing), arm_iterations + answer.iterations
+
+    def _feet_step(self, pose: Pose, targets: Array, dt: float) -> Array:
+        """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are."""
+        limits, here = self.settings.limits, pose.soles_in_base - self._hips
+        if self.mode is Mode.DOUBLE:
+            self._feet.restart(here)
+        wanted = self._feet.step(targets[FEET], dt)
+        return np.asarray(
+            limited_step(here, self._feet_velocity, wanted, dt, limits.foot_speed, limits.foot_acceleration)
+        )
 
     def _start(self, seen: Observation, targets: Array, footing: Footing) -> GivenUp:
         """Frame 0: the double-support stand nearest to the person's posture, found without speed limits."""
@@ -134,6 +145,7 @@ class Imitator:
         assert self._pose is not None
         self._hands.restart(self._arms.hands(self._pose))
         self._feet.restart(self._pose.soles_in_base - self._hips)
+        self._feet_velocity = np.zeros((2, 3))
 
     def _footing(self, seen: Observation, targets: Array, ahead: str, may_lift: bool) -> Footing:
         """What the person's feet ask for: support, offset (6), and where a swing foot would land."""

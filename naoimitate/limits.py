@@ -62,6 +62,17 @@ class Follower:
 
 
 @njit(cache=True)
+def limited_step(p: Array, v: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> Array:
+    """Where points p (K, 3) m with velocities v (K, 3) m/s may be asked to be dt s later on their way to targets (K, 3).
+
+    Asked from where the points really are, so that nothing jumps when what held them back lets go.
+    """
+    here, speed = p.copy(), v.copy()
+    follow(here, speed, target.copy(), target, dt, max_speed, max_acceleration)
+    return here
+
+
+@njit(cache=True)
 def follow(p: Array, v: Array, last: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> None:
     """One step of points p, v (K, 3) towards ``target``, whose previous value is ``last``; all three are updated.
 

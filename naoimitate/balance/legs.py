@@ -78,6 +78,8 @@ class LegWeights(NamedTuple):
     """[m/rad] of the swing sole's orientation in free swing."""
     rest: float = 0.004
     """[m/rad] towards the rest posture: decides only what the rest leaves open."""
+    secondary_step: float = 0.02
+    """[rad] of level and rest that one frame may ask for: the feet's own errors are as short, a frame's way each."""
     damping: float = 0.002
     """[m/rad] of the damped least squares in the first step."""
     damping_growth: float = 8.0
@@ -273,6 +275,8 @@ def solve_legs(
         else:
             if stance.kind == REACH:
                 _add_task(Jow, e_pos, weights.reach, H, g)
+            else:
+                e_rot *= min(1.0, weights.secondary_step / max(np.linalg.norm(e_rot), 1e-9))
             _add_task(Wow, e_rot, weights.reach_turn if stance.kind == REACH else weights.level, H, g)
             for k in range(corners):
                 arm = R_wo[:, 0] * legs.outline[o, k, 0] + R_wo[:, 1] * legs.outline[o, k, 1]
@@ -289,7 +293,8 @@ def solve_legs(
         for i in range(n):
             j = legs.joints[i]
             H[i, i] += damping * damping + weights.rest**2
-            g[i] += weights.rest**2 * (legs.rest[j] - q[j])
+            pull = min(max(legs.rest[j] - q[j], -weights.secondary_step), weights.secondary_step)
+            g[i] += weights.rest**2 * pull
             C[row, i], b[row] = 1.0, max(q_low[j], min(legs.lower[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5)) - q[j]
             C[row + 1, i], b[row + 1] = -1.0, q[j] - min(q_high[j], max(legs.upper[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5))
             row += 2

@@ -22,9 +22,9 @@ from naoimitate.balance.offset import OffsetLaw, advance
 from naoimitate.balance.planted import SCALES, Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
-from naoimitate.balance.soles import into_tables, shortened, soles_and_com, solve_soles, uncoupled_leg, uncoupled_legs
+from naoimitate.balance.soles import SoleGoal, into_tables, shortened, soles_and_com, solve_soles, uncoupled_leg
 from naoimitate.core.frames import GivenUp
-from naoimitate.core.geometry import heading, yaw_matrix
+from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
 from naoimitate.gate import Gate
 from naoimitate.limb import solve_limb_fixed
@@ -96,8 +96,8 @@ class PaperFeet:
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, gate: Gate, law: OffsetLaw, ik: PaperIk, foot_speed: float) -> None:
         self._tree, self._maker, self._planted, self._gate = robot.tree, maker, planted, gate
-        self._legs = uncoupled_legs(robot, legs)
-        self._limbs = [uncoupled_leg(robot, side) for side in "lr"]
+        self._legs, self._limbs = legs, [uncoupled_leg(robot, side) for side in "lr"]
+        self._leg_joints = np.concatenate([limb.joints for limb in self._limbs])
         self._law, self._ik, self._foot_speed = law, ik, foot_speed
         self._stand = maker.stand(robot.postures["stand"]).soles_in_base - legs.hip
 
@@ -106,7 +106,8 @@ class PaperFeet:
         pose = self._planted.place(q, feet, footing)
         self._fsm, self._landed, self._side, self._share = SupportFsm(), False, 0, 1.0
         self._offset, self._speed = self._planted.offset, 0.0
-        self._mapped = pose.q[self._legs.joints]
+        self._mapped = pose.q[self._leg_joints]
+        self._between = wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1]))
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
         return pose
 
@@ -129,10 +130,9 @@ class PaperFeet:
         places = self._raised(mapped, com, pose) if single else shifted(mapped, com, offset)
         turned = np.array([self.mode.stance != "R" or self.mode.landing, self.mode.stance != "L" or self.mode.landing])
         q, ik = q_arms.copy(), self._ik
-        used, _ = solve_soles(
-            self._tree, self._legs, places, up_vector(*places, com, offset), turned, q,
-            ik.damping, ik.position_tolerance, ik.angle_tolerance, ik.max_iterations,
-        )  # fmt: skip
+        goal = SoleGoal(places, up_vector(*places, com, offset), turned, self._between)
+        tolerance = ik.position_tolerance, ik.angle_tolerance
+        used, _ = solve_soles(self._tree, self._legs, goal, q, ik.damping, *tolerance, ik.max_iterations)
         way = float(np.linalg.norm(soles_and_com(self._tree, self._legs, q)[0] - soles, axis=1).max())
         near = min(1.0, self._foot_speed * reach.dt / max(way, 1e-9))
         self._hang_on(self._base_side(mapped, com, offset), pose)
@@ -157,10 +157,10 @@ class PaperFeet:
     def _mapped_soles(self, q_arms: Array, feet: Array) -> Array:
         """Centres of the soles (2, 3) m in the torso frame where the posture mapping puts them."""
         q = q_arms.copy()
-        q[self._legs.joints] = self._mapped
+        q[self._leg_joints] = self._mapped
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        self._mapped = q[self._legs.joints]
+        self._mapped = q[self._leg_joints]
         return soles_and_com(self._tree, self._legs, q)[0]
 
     def _raised(self, soles: Array, com: Array, pose: Pose) -> Array:

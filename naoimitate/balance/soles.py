@@ -8,6 +8,8 @@ so that Chang and Dubey's weights keep it from pushing against them.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -20,8 +22,23 @@ from naoimitate.robot.model import RobotModel, Tree
 
 Array = npt.NDArray[np.float64]
 
+ROWS = 13
+"""Of the problem: place and normal of two soles (in three rows each), and the angle between their headings."""
 STALLED = 1e-5
 """[rad] of the largest joint movement in an iteration below which a solve has come as near as it can."""
+
+
+class SoleGoal(NamedTuple):
+    """What is asked of both soles, in the torso frame.
+
+    places: (2, 3) m of their centres. normal: (3,) of the soles that are ``turned``, (2,) bool. between: rad, the left
+    sole's heading from the right one's, where both are turned.
+    """
+
+    places: Array
+    normal: Array
+    turned: npt.NDArray[np.bool_]
+    between: float
 
 
 def uncoupled_leg(robot: RobotModel, side: str) -> Limb:
@@ -114,10 +131,14 @@ def _errors(tree: Tree, legs: Legs, goal: SoleGoal, pos: Array, rot: Array, A: A
     if goal.turned.all():
         A[12] = goal.normal @ (W[0] - W[1])
         e[12] = goal.between - angle_between(legs, rot, goal.normal)
-    else:
-        for v in range(n):
-            A[12, v] = 1.0 if legs.shared[v] else 0.0
     return arrived and abs(e[12]) < angle
+
+
+@njit(cache=True)
+def angle_between(legs: Legs, rot: Array, normal: Array) -> float:
+    """The left sole's heading about ``normal`` (3,), from the right sole's, rad."""
+    left, right = rot[legs.sole_joint[0] + 1][:, 0], rot[legs.sole_joint[1] + 1][:, 0]
+    return float(np.arctan2(np.dot(np.cross(right, left), normal), np.dot(right, left)))
 
 
 @njit(cache=True)

@@ -117,10 +117,8 @@ class Stride:
             self._swing.stop()
 
     def com_goal(self, offset: float) -> Array:
-        """Where the CoM's projection belongs, (2,) m: p_L + o (p_R - p_L), or over the stance foot's centre."""
+        """Where the CoM's projection belongs, (2,) m: p_L + o (p_R - p_L), with the feet where they stand or last stood."""
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
-        if self.swinging:
-            offset = float(self.side)
         return np.asarray((left + offset * (right - left))[:2])
 
     def _changed(self, before: Mode) -> None:

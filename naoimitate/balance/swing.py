@@ -48,8 +48,10 @@ class SwingSettings:
     """[m/s^2] up and over."""
     descend_acceleration: float = 1.0
     """[m/s^2] down: a soft end, after which the robot does not sway."""
-    turn_speed: float = 2.5
+    turn_speed: float = 2.0
     """[rad/s]."""
+    turn_acceleration: float = 12.0
+    """[rad/s^2]."""
     arrived: float = 0.001
     """[m] and [rad * 0.1 m]: the foot is over its landing place, close enough to go straight down."""
 
@@ -64,7 +66,7 @@ class Swing:
         self.phase = Phase.LIFT
         self.settings = settings
         self.min_height = 0.0
-        self._velocity = np.zeros(3)
+        self._velocity, self._turning = np.zeros(3), 0.0
         self._start = position.copy()
         self._rotation = rotation.copy()
 
@@ -79,7 +81,7 @@ class Swing:
         if not landing:
             self.phase = Phase.FREE
             self.min_height = min(self.settings.clearance, self.min_height + self.settings.lift_speed * dt)
-            self._velocity[:] = 0.0
+            self._velocity[:], self._turning = 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
         if self.phase is Phase.DESCEND:
             return self._descend(position, dt)
@@ -88,6 +90,7 @@ class Swing:
     def stop(self) -> None:
         """The last step was not taken: start again from rest."""
         self._velocity[:] = 0.0
+        self._turning = 0.0
 
     def _lift(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
         speed = min(self._velocity[2] + self.settings.acceleration * dt, self.settings.lift_speed)
@@ -110,8 +113,15 @@ class Swing:
             self._velocity[:] = 0.0
             return self._descend(position, dt)
         step = self._braked(way, dt)
-        part = min(1.0, self.settings.turn_speed * dt / angle) if angle > 0.0 else 1.0
+        part = self._turn(angle, dt) / angle if angle > 0.0 else 1.0
         return position + step, matrix_from_rotation_vector(part * turn) @ rotation, False
+
+    def _turn(self, angle: float, dt: float) -> float:
+        """How far (rad) to turn next on a way of ``angle``."""
+        s = self.settings
+        braking = math.sqrt(2.0 * s.turn_acceleration * angle)
+        self._turning = min(self._turning + s.turn_acceleration * dt, s.turn_speed, braking)
+        return min(self._turning * dt, angle)
 
     def _braked(self, way: Array, dt: float) -> Array:
         distance = float(np.linalg.norm(way))
