@@ -111,7 +111,10 @@ def build_legs(robot: RobotModel, limits: LegLimits) -> Legs:
     lower, upper = robot.lower + limits.range_reserve, robot.upper - limits.range_reserve
     for side in ("l", "r"):
         knee = robot.points[f"{side}_knee"].joint
-        lower[knee] = max(lower[knee], limits.knee_min)
+        if upper[knee] >= -lower[knee]:
+            lower[knee] = max(lower[knee], limits.knee_min)
+        else:
+            upper[knee] = min(upper[knee], -limits.knee_min)
     tables = [t for t in robot.tables if variable[t.y] >= 0]
     rows = max((len(t.rows) for t in tables), default=1)
     return Legs(
