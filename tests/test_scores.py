@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 import json
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from second_robot import write_second_robot
 from synthetic import of_poses, planted_base, standing, tilted
 
 from naoimitate.core.errors import RunFileError
@@ -77,6 +79,21 @@ def test_every_key_of_the_contract_is_in_the_json_sheet(robot: RobotModel) -> No
     assert set(CONTRACT) <= set(values)
     assert json.loads(json.dumps(values)) == values
     assert len(as_lines(score_run(standing(robot, 20), robot))) == len(values) - 2
+
+
+def test_another_robot_is_measured_the_same_way(tmp_path: Path) -> None:
+    """Three-joint arms without a wrist, uncoupled hips: nothing in the scores knows the first robot."""
+    other = load_robot(write_second_robot(tmp_path))
+    run = standing(other, 60)
+    sheet = measures(run, other)
+    assert not missed(run, other)
+    assert sheet["margin_min_mm"].value > 10.0
+    slid = changed(run, base_pos=run.base_pos + np.linspace(0.0, 1.0, 60)[:, None] * [0.003, 0.0, 0.0])
+    assert missed(slid, other) == {"slip_max_mm"}
+    far = run.human_posture.copy()
+    far[:, 0] *= 2.0
+    reaching = measures(changed(run, human_posture=far), other)
+    assert 0.0 <= reaching["hand_excess_cm_mean"].value < reaching["hand_error_cm_mean"].value
 
 
 def test_the_programs_own_com_is_not_believed(robot: RobotModel) -> None:
