@@ -136,8 +136,8 @@ def test_shapes_have_the_same_size_left_and_right(robot: RobotModel) -> None:
 
 def test_other_yaml_files_of_the_folder_are_data(tmp_path: Path) -> None:
     folder = second.write_second_robot(tmp_path)
-    (folder / "landing.yaml").write_text("width: [0.08, 0.17]\n")
-    assert load_robot(folder).data["landing"] == {"width": [0.08, 0.17]}
+    (folder / "drivers.yaml").write_text("ports: [3, 4]\n")
+    assert load_robot(folder).data["drivers"] == {"ports": [3, 4]}
 
 
 def test_a_joint_that_does_not_exist_is_named(nao: RobotModel) -> None:
