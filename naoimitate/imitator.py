@@ -97,7 +97,7 @@ class Imitator:
             given_up, iterations = self._start(seen, targets, footing), 0
         else:
             elapsed = frame.time - self._last_time if dt is None else dt
-            elapsed = min(max(elapsed, self.settings.limits.min_dt), self.settings.limits.max_dt)
+            elapsed = min(self.settings.limits.max_dt, max(self.settings.limits.min_dt, elapsed))
             self._time += elapsed
             given_up, iterations = self._advance(self._pose, seen, targets, footing, elapsed)
         self._last_time = frame.time
@@ -105,8 +105,7 @@ class Imitator:
 
     def _advance(self, pose: Pose, seen: Observation, targets: Array, footing: Footing, dt: float) -> tuple[GivenUp, int]:
         """One frame: limited targets, arms and head, then the legs under them."""
-        turn = self.robot.speed * (self.settings.limits.joint_share * dt)
-        reach = Reach(dt, pose.q - turn, pose.q + turn)
+        reach = self._reach(pose, dt)
         hands = self._hands.step(targets[HANDS], dt)
         feet = self._feet_step(pose, targets, dt)
         self._clearance.look(pose)
@@ -115,9 +114,18 @@ class Imitator:
         answer = self._retargeting.step(pose, q, feet, footing, reach)
         self._pose = answer.pose
         self._feet_velocity = (answer.pose.soles_in_base - pose.soles_in_base) / dt
+        self._velocity = (answer.pose.q - pose.q) / dt
         if GivenUp.HOLD in answer.given_up:
             self._stand_still()
         return answer.given_up | self._missed(answer.pose, seen, targets, footing), arm_iterations + answer.iterations
+
+    def _reach(self, pose: Pose, dt: float) -> Reach:
+        """The joint angles that a frame of dt s allows after a pose."""
+        limits = self.settings.limits
+        turn = self.robot.speed * (limits.joint_share * dt)
+        low, high = pose.q - turn, pose.q + turn
+        coasting, change = pose.q + self._velocity * dt, limits.joint_acceleration * dt * dt
+        return Reach(dt, low, high, np.clip(coasting - change, low, high), np.clip(coasting + change, low, high))
 
     def _feet_step(self, pose: Pose, targets: Array, dt: float) -> Array:
         """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are."""
@@ -145,7 +153,7 @@ class Imitator:
         assert self._pose is not None
         self._hands.restart(self._arms.hands(self._pose))
         self._feet.restart(self._pose.soles_in_base - self._hips)
-        self._feet_velocity = np.zeros((2, 3))
+        self._feet_velocity, self._velocity = np.zeros((2, 3)), np.zeros(len(self.robot.joint_names))
 
     def _footing(self, seen: Observation, targets: Array, ahead: str, may_lift: bool) -> Footing:
         """What the person's feet ask for: support, offset (6), and where a swing foot would land."""

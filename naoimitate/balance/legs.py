@@ -70,9 +70,13 @@ class LegWeights(NamedTuple):
     """Of the feet in the torso frame."""
     com_slack: float = 0.010
     """[m] of CoM error along x and y that nothing may exceed (or increase, where it is already larger)."""
-    reach: float = 20.0
+    still: float = 0.3
+    """Of the torso's own motion over the floor in a frame: it goes no faster than the feet's targets need."""
+    still_reaching: float = 1.0
+    """The same while a foot reaches for its landing place: the foot then waits for the torso."""
+    reach: float = 4.0
     """Of the sole's place in the world on its way to a landing."""
-    reach_turn: float = 2.0
+    reach_turn: float = 0.4
     """[m/rad] of its orientation then."""
     level: float = 0.02
     """[m/rad] of the swing sole's orientation in free swing."""
@@ -92,8 +96,9 @@ class LegWeights(NamedTuple):
 class LegLimits:
     """Reserves kept inside the robot's own limits."""
 
-    knee_min: float = 0.15
-    """[rad] below which the torso loses one of its five free directions with both soles planted."""
+    knee_min: float = 0.30
+    """[rad]. Below 0.15 the torso loses one of its five free directions with both soles planted; from there to 0.3 a lift
+    of millimetres still takes radians a second of the knee. It costs 1.7 mm of leg length."""
     range_reserve: float = 0.002
     """[rad] kept from every joint limit."""
 
@@ -232,6 +237,7 @@ def solve_legs(
     equalities = 6 if stance.kind == POSE else 0
     corners = legs.outline.shape[1] if stance.kind != POSE else 0
     tables = legs.table_x.shape[0]
+    start = np.array([q[j] for j in legs.joints])
     C = np.zeros((equalities + 4 + 2 * n + 2 * tables + corners + rows.shape[0], n))
     b = np.empty(C.shape[0])
     closure, com_error = 0.0, 0.0
@@ -265,6 +271,10 @@ def solve_legs(
         _add_task(Jo, goal.feet[o] - (po - legs.hip[o]), weights.foot * goal.foot_weight[o], H, g)
         Jc -= Js
         add_cross(com - ps, Ws, Jc)
+        Jb = -Js
+        add_cross(-ps, Ws, Jb)
+        still = weights.still_reaching if stance.kind == REACH else weights.still
+        _add_task(Jb, np.zeros(3), still, H, g)
         Jcw = R_wb @ Jc
         _add_task(Jcw[:2], e_com, weights.com, H, g)
         Jow = Jo - Js
@@ -298,8 +308,8 @@ def solve_legs(
             H[i, i] += damping * damping + weights.rest**2
             pull = min(max(legs.rest[j] - q[j], -weights.secondary_step), weights.secondary_step)
             g[i] += weights.rest**2 * pull
-            C[row, i], b[row] = 1.0, max(q_low[j], min(legs.lower[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5)) - q[j]
-            C[row + 1, i], b[row + 1] = -1.0, q[j] - min(q_high[j], max(legs.upper[j], q_low[j] + (q_high[j] - q_low[j]) * 0.5))
+            C[row, i], b[row] = 1.0, max(q_low[j], min(legs.lower[j], start[i])) - q[j]
+            C[row + 1, i], b[row + 1] = -1.0, q[j] - min(q_high[j], max(legs.upper[j], start[i]))
             row += 2
         row = _table_rows(legs, q, C, b, row)
         for k in range(rows.shape[0]):

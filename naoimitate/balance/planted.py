@@ -34,7 +34,7 @@ PLACE_STEP = 0.1
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
-LANDING_WEIGHT = 0.05
+LANDING_WEIGHT = 0.3
 """Of the stance foot's target while the other one lands: the torso gives way, as in the proof of the landing set."""
 
 
@@ -96,13 +96,21 @@ class Planted:
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side)
-        for bounds in (rows[1], np.minimum(rows[1], 0.0)):
+        ways = (
+            (reach.smooth_low, reach.smooth_high, rows[1]),
+            (reach.low, reach.high, rows[1]),
+            (reach.low, reach.high, np.minimum(rows[1], 0.0)),
+        )
+        start, iterations = q.copy(), 0
+        for low, high, bounds in ways:
+            q[:] = start
             done, closure, _ = solve_legs(
-                self._tree, self._legs, weights, stance, goal, q, reach.low, reach.high, rows[0], bounds
+                self._tree, self._legs, weights, stance, goal, q, low, high, rows[0], bounds
             )
-            if done > 0:
-                break
-        return done, done > 0 and (plan.kind != POSE or closure < CLOSED)
+            iterations += done
+            if done > 0 and (plan.kind != POSE or closure < CLOSED):
+                return iterations, True
+        return iterations, False
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
@@ -120,7 +128,8 @@ class Planted:
         for k in range(PLACE_STEPS):
             part = min(1.0, 2.0 * (k + 1) / PLACE_STEPS)
             position, rotation = start[0] + part * (goal - start[0]), yaw_matrix(part * turn)
-            reach = Reach(0.0, pose.q - PLACE_STEP, pose.q + PLACE_STEP)
+            low, high = pose.q - PLACE_STEP, pose.q + PLACE_STEP
+            reach = Reach(0.0, low, high, low, high)
             q = pose.q.copy()
             _, closed = self._solve(q, Plan(offset, 0.0, position, rotation, POSE), pose, feet, 1.0, reach)
             if closed:

@@ -45,11 +45,16 @@ class Footing:
 
 @dataclass(frozen=True)
 class Reach:
-    """What a frame's time allows: dt in s; low, high: (J,) rad, the joint angles within the speed limits."""
+    """What a frame's time allows: dt in s; joint angles (J,) rad within the speed limits, and within the accelerations.
+
+    smooth_low, smooth_high lie within low, high; they are kept wherever the feet allow it.
+    """
 
     dt: float
     low: Array
     high: Array
+    smooth_low: Array
+    smooth_high: Array
 
 
 @dataclass(frozen=True)

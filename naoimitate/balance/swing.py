@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from naoimitate.core.geometry import matrix_from_rotation_vector, rotation_vector, yaw_matrix
+from naoimitate.core.geometry import heading, matrix_from_rotation_vector, rotation_vector, yaw_matrix
 
 Array = npt.NDArray[np.float64]
 
@@ -52,6 +52,14 @@ class SwingSettings:
     """[rad/s]."""
     turn_acceleration: float = 12.0
     """[rad/s^2]."""
+    level_speed: float = 0.1
+    """[rad/s] at which the last tilt goes while the foot comes down."""
+    level_height: float = 0.006
+    """[m] below which the foot does not come before it is level."""
+    patience: float = 1.5
+    """[s] of approach after which a foot that does not arrive may come down near its place."""
+    yielding: float = 0.01
+    """[m/s] by which the distance that is near enough grows from then on."""
     arrived: float = 0.001
     """[m] and [rad * 0.1 m]: the foot is over its landing place, close enough to go straight down."""
 
@@ -67,6 +75,8 @@ class Swing:
         self.settings = settings
         self.min_height = 0.0
         self._velocity, self._turning = np.zeros(3), 0.0
+        self._waited = 0.0
+        self._before = position.copy()
         self._start = position.copy()
         self._rotation = rotation.copy()
 
@@ -76,15 +86,16 @@ class Swing:
         position, rotation: the sole as it is. goal (2,) m, goal_yaw rad: where it is to land, used once ``landing``.
         Returns position (3,), rotation (3, 3), and whether it has touched down.
         """
+        moved, self._before = position - self._before, position.copy()
         if self.phase is Phase.LIFT:
             return self._lift(position, dt)
         if not landing:
             self.phase = Phase.FREE
             self.min_height = min(self.settings.clearance, self.min_height + self.settings.lift_speed * dt)
-            self._velocity[:], self._turning = 0.0, 0.0
+            self._velocity, self._turning, self._waited = moved / dt, 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
         if self.phase is Phase.DESCEND:
-            return self._descend(position, dt)
+            return self._descend(position, rotation, dt)
         return self._approach(position, rotation, goal, goal_yaw, dt)
 
     def stop(self) -> None:
@@ -107,11 +118,13 @@ class Swing:
         level = yaw_matrix(goal_yaw)
         turn = rotation_vector(level @ rotation.T)
         way, angle = target - position, float(np.linalg.norm(turn))
-        if np.linalg.norm(way) < self.settings.arrived and 0.1 * angle < self.settings.arrived:
+        self._waited += dt
+        near = self.settings.arrived + self.settings.yielding * max(self._waited - self.settings.patience, 0.0)
+        if np.linalg.norm(way) < near and 0.1 * angle < near:
             self.phase = Phase.DESCEND
-            self._start, self._rotation = target, level
+            self._start = position.copy()
             self._velocity[:] = 0.0
-            return self._descend(position, dt)
+            return self._descend(position, rotation, dt)
         step = self._braked(way, dt)
         part = self._turn(angle, dt) / angle if angle > 0.0 else 1.0
         return position + step, matrix_from_rotation_vector(part * turn) @ rotation, False
@@ -137,10 +150,18 @@ class Swing:
         step = self._velocity * dt
         return way if np.linalg.norm(step - way) < 1e-5 else step
 
-    def _descend(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
+    def _descend(self, position: Array, rotation: Array, dt: float) -> tuple[Array, Array, bool]:
+        """Straight down from where the foot has arrived; what is left of its tilt goes on the way."""
         s = self.settings
         braking = math.sqrt(s.touch_speed**2 + 2.0 * s.descend_acceleration * max(position[2], 0.0))
         speed = min(-self._velocity[2] + s.descend_acceleration * dt, s.descend_speed, braking)
         self._velocity[:] = (0.0, 0.0, -speed)
-        height = max(position[2] - speed * dt, 0.0)
-        return np.array([self._start[0], self._start[1], height]), self._rotation, height <= s.touch_height
+        flat = yaw_matrix(heading(rotation))
+        tilt = rotation_vector(flat @ rotation.T)
+        angle = float(np.linalg.norm(tilt))
+        level = angle <= s.level_speed * dt
+        lowest = s.touch_height if level else s.level_height
+        height = max(position[2] - speed * dt, min(lowest, position[2]) if not level else 0.0)
+        if not level:
+            flat = matrix_from_rotation_vector(tilt * (s.level_speed * dt / angle)) @ rotation
+        return np.array([self._start[0], self._start[1], height]), flat, level and height <= s.touch_height
