@@ -167,11 +167,17 @@ class Stance(NamedTuple):
 
 
 class LegGoal(NamedTuple):
-    """feet: (2, 3) m, hip to sole in the torso frame, (5). com: (2,) m, world. foot_weight: (2,)."""
+    """feet: (2, 3) m, hip to sole in the torso frame, (5). com: (2,) m, world. foot_weight: (2,).
+
+    turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes: the torso is the
+    heaviest body, and what turns it tips the stance foot.
+    """
 
     feet: Array
     com: Array
     foot_weight: Array
+    turn_low: Array
+    turn_high: Array
 
 
 @njit(cache=True)
@@ -238,7 +244,7 @@ def solve_legs(
     corners = legs.outline.shape[1] if stance.kind != POSE else 0
     tables = legs.table_x.shape[0]
     start = np.array([q[j] for j in legs.joints])
-    C = np.zeros((equalities + 4 + 2 * n + 2 * tables + corners + rows.shape[0], n))
+    C = np.zeros((equalities + 10 + 2 * n + 2 * tables + corners + rows.shape[0], n))
     b = np.empty(C.shape[0])
     closure, com_error = 0.0, 0.0
     limit, damping, done = int(weights.iterations), weights.damping, 0
@@ -302,6 +308,11 @@ def solve_legs(
                 slack[k] = max(weights.com_slack, abs(e_com[k]))
             C[row], b[row] = Jcw[k], e_com[k] - slack[k]
             C[row + 1], b[row + 1] = -Jcw[k], -e_com[k] - slack[k]
+            row += 2
+        turned = Ws @ moved
+        for k in range(3):
+            C[row], b[row] = -Ws[k], goal.turn_low[k] + turned[k]
+            C[row + 1], b[row + 1] = Ws[k], -goal.turn_high[k] - turned[k]
             row += 2
         for i in range(n):
             j = legs.joints[i]

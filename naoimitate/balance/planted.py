@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -38,12 +40,23 @@ LANDING_WEIGHT = 0.3
 """Of the stance foot's target while the other one lands: the torso gives way, as in the proof of the landing set."""
 
 
+@dataclass(frozen=True)
+class CalmTorso:
+    """How fast the torso may turn, wherever the feet allow it."""
+
+    turn_speed: float = 1.2
+    """[rad/s]."""
+    turn_acceleration: float = 10.0
+    """[rad/s^2]: with about 0.05 kg m^2 and 52 N that moves the ZMP of a small humanoid by 1 cm."""
+
+
 class Planted:
     """Soles fixed in the world; the torso moves over them."""
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, stride: Stride, weights: LegWeights, clearance: Clearance, gate: Gate) -> None:
         self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
         self._weights, self._clearance, self._gate = weights, clearance, gate
+        self._calm, self._turning = CalmTorso(), np.zeros(3)
 
     @property
     def mode(self) -> Mode:
@@ -69,8 +82,10 @@ class Planted:
             candidate = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
                 stride.accept(plan, scale)
+                self._turning = rotation_vector(pose.base_rot.T @ candidate.base_rot) / reach.dt
                 return Answer(candidate, given_up, iterations)
         stride.hold()
+        self._turning = np.zeros(3)
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
     def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
@@ -90,27 +105,37 @@ class Planted:
             foot_weight[:] = (LANDING_WEIGHT, LANDING_WEIGHT) if stride.mode.landing else (1.0, 1.0)
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
-        goal = LegGoal(feet, stride.com_goal(offset), foot_weight)
+        free = np.full(3, np.inf)
+        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free)
+        calm = goal._replace(turn_low=self._turn_bounds(reach.dt)[0], turn_high=self._turn_bounds(reach.dt)[1])
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side)
         ways = (
-            (reach.smooth_low, reach.smooth_high, rows[1]),
-            (reach.low, reach.high, rows[1]),
-            (reach.low, reach.high, np.minimum(rows[1], 0.0)),
+            (calm, reach.smooth_low, reach.smooth_high, rows[1]),
+            (calm, reach.low, reach.high, rows[1]),
+            (goal, reach.low, reach.high, np.minimum(rows[1], 0.0)),
         )
         start, iterations = q.copy(), 0
-        for low, high, bounds in ways:
+        for wish, low, high, bounds in ways:
             q[:] = start
             done, closure, _ = solve_legs(
-                self._tree, self._legs, weights, stance, goal, q, low, high, rows[0], bounds
+                self._tree, self._legs, weights, stance, wish, q, low, high, rows[0], bounds
             )
             iterations += done
             if done > 0 and (plan.kind != POSE or closure < CLOSED):
                 return iterations, True
         return iterations, False
+
+    def _turn_bounds(self, dt: float) -> tuple[Array, Array]:
+        """Least and largest rotation (3,) rad of the torso in a frame of dt s; none while the robot is being placed."""
+        if dt == 0.0:
+            return np.full(3, -np.inf), np.full(3, np.inf)
+        most, change = self._calm.turn_speed * dt, self._calm.turn_acceleration * dt * dt
+        coasting = self._turning * dt
+        return np.clip(coasting - change, -most, most), np.clip(coasting + change, -most, most)
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
@@ -137,5 +162,6 @@ class Planted:
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
         middle = heading(rotation) * 0.5
         R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
+        self._turning = np.zeros(3)
         stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
         return self._maker.hang(pose.q, 1, stride.planted_pos, stride.planted_rot)
