@@ -31,6 +31,12 @@ EDGES = {
     "does not stand on a bad left foot": (D, SupportInput("L", 0.0, stance_ok=LEFT_BAD), D),
     "does not stand on a bad right foot": (D, SupportInput("R", 1.0, stance_ok=RIGHT_BAD), D),
     "a bad stance is no matter while the person has both feet down": (D, SupportInput("D", 0.0, stance_ok=LEFT_BAD), D),
+    "leaves a bad stance before the foot is needed (re-lift)": (
+        D,
+        SupportInput("D", 1.0, stance_ok=LEFT_BAD, ahead="L"),
+        R,
+    ),
+    "leaves a bad right stance before it is needed": (D, SupportInput("D", 0.0, stance_ok=RIGHT_BAD, ahead="R"), L),
     "stays on the left foot with the person": (L, SupportInput("L", 0.0), L),
     "stays on the right foot with the person": (R, SupportInput("R", 1.0), R),
     "stays on one foot when lifting is forbidden": (L, SupportInput("L", 0.0, may_lift=False), L),
@@ -48,6 +54,12 @@ EDGES = {
     "has landed on the right": (ON_RIGHT, SupportInput("D", 1.0, landed=True), D),
     "passes double support on the way to the other foot": (ON_LEFT, SupportInput("R", 0.0, landed=True), D),
     "has landed although the person lifts again": (ON_LEFT, SupportInput("L", 0.0, landed=True), D),
+    "does not turn back on the last way down to the left": (ON_LEFT, SupportInput("L", 0.0, descending=True), ON_LEFT),
+    "does not turn back on the last way down to the right": (
+        ON_RIGHT,
+        SupportInput("R", 1.0, descending=True),
+        ON_RIGHT,
+    ),
     "breaks a landing on the left off": (ON_LEFT, SupportInput("L", 0.0), L),
     "breaks a landing on the right off": (ON_RIGHT, SupportInput("R", 1.0), R),
 }
@@ -79,6 +91,7 @@ INPUTS = st.builds(
     human=st.sampled_from("DLRF"),
     offset=st.one_of(st.sampled_from([0.0, 0.01, 0.5, 0.99, 1.0]), st.floats(0.0, 1.0)),
     landed=st.booleans(),
+    descending=st.booleans(),
     stance_ok=st.tuples(st.booleans(), st.booleans()),
     ahead=st.sampled_from(["", "L", "R"]),
     may_lift=st.booleans(),
@@ -92,12 +105,13 @@ def test_every_transition_is_safe_whatever_comes_in(mode: Mode, seen: SupportInp
     if mode is D:
         assert not after.landing
         if after is not D:
-            assert seen.may_lift and seen.human in "LR"
+            assert seen.may_lift and (seen.human in "LR" or seen.ahead)
             assert abs(seen.offset - (0.0 if after is L else 1.0)) <= OFFSET_REACHED + 1e-12
-            assert seen.stance_ok[0 if after is L else 1] or seen.stance_ok == (False, False)
+            needed = seen.human if seen.human in "LR" else seen.ahead
+            assert seen.stance_ok["LR".index(needed)] == (after.stance == needed)
     else:
         assert after.stance == mode.stance or (after is D and mode.landing and seen.landed)
-    if seen.human == "F" and not mode.landing:
+    if seen.human == "F" and not seen.ahead and not mode.landing:
         assert after is mode
 
 
@@ -162,7 +176,8 @@ class Walker:
     def step(self, human: str, human_offset: float, ahead: str = "") -> Mode:
         before = self.fsm.mode
         ok = (True, True) if self.good or before is not D else (self.offset < 0.5, self.offset >= 0.5)
-        seen = SupportInput(human, self.offset, before.landing and self.height == 0.0, ok, ahead)
+        low = before.landing and self.height < 0.3
+        seen = SupportInput(human, self.offset, before.landing and self.height == 0.0, low, ok, ahead)
         mode = self.fsm.step(seen)
         target = offset_target(mode, seen, human_offset)
         self.offset, self.speed = advance(self.offset, self.speed, target, DT, OffsetLaw(), 3.0)
