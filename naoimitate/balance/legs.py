@@ -169,8 +169,8 @@ class Stance(NamedTuple):
 class LegGoal(NamedTuple):
     """feet: (2, 3) m, hip to sole in the torso frame, (5). com: (2,) m, world. foot_weight: (2,).
 
-    turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes: the torso is the
-    heaviest body, and what turns it tips the stance foot.
+    turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes; move_low, move_high:
+    (3,) m, of its origin's way, along them. The torso is the heaviest body: what jerks it tips the stance foot.
     """
 
     feet: Array
@@ -178,6 +178,8 @@ class LegGoal(NamedTuple):
     foot_weight: Array
     turn_low: Array
     turn_high: Array
+    move_low: Array
+    move_high: Array
 
 
 @njit(cache=True)
@@ -244,7 +246,7 @@ def solve_legs(
     corners = legs.outline.shape[1] if stance.kind != POSE else 0
     tables = legs.table_x.shape[0]
     start = np.array([q[j] for j in legs.joints])
-    C = np.zeros((equalities + 10 + 2 * n + 2 * tables + corners + rows.shape[0], n))
+    C = np.zeros((equalities + 16 + 2 * n + 2 * tables + corners + rows.shape[0], n))
     b = np.empty(C.shape[0])
     closure, com_error = 0.0, 0.0
     limit, damping, done = int(weights.iterations), weights.damping, 0
@@ -309,8 +311,11 @@ def solve_legs(
             C[row], b[row] = Jcw[k], e_com[k] - slack[k]
             C[row + 1], b[row + 1] = -Jcw[k], -e_com[k] - slack[k]
             row += 2
-        turned = Ws @ moved
+        turned, went = Ws @ moved, Jb @ moved
         for k in range(3):
+            C[row], b[row] = Jb[k], goal.move_low[k] - went[k]
+            C[row + 1], b[row + 1] = -Jb[k], went[k] - goal.move_high[k]
+            row += 2
             C[row], b[row] = -Ws[k], goal.turn_low[k] + turned[k]
             C[row + 1], b[row + 1] = Ws[k], -goal.turn_high[k] - turned[k]
             row += 2

@@ -48,6 +48,10 @@ class CalmTorso:
     """[rad/s]."""
     turn_acceleration: float = 10.0
     """[rad/s^2]: with about 0.05 kg m^2 and 52 N that moves the ZMP of a small humanoid by 1 cm."""
+    speed: float = 0.25
+    """[m/s]."""
+    acceleration: float = 2.0
+    """[m/s^2]."""
 
 
 class Planted:
@@ -56,7 +60,7 @@ class Planted:
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, stride: Stride, weights: LegWeights, clearance: Clearance, gate: Gate) -> None:
         self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
         self._weights, self._clearance, self._gate = weights, clearance, gate
-        self._calm, self._turning = CalmTorso(), np.zeros(3)
+        self._calm, self._turning, self._moving = CalmTorso(), np.zeros(3), np.zeros(3)
 
     @property
     def mode(self) -> Mode:
@@ -83,9 +87,10 @@ class Planted:
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
                 stride.accept(plan, scale)
                 self._turning = rotation_vector(pose.base_rot.T @ candidate.base_rot) / reach.dt
+                self._moving = pose.base_rot.T @ (candidate.base_pos - pose.base_pos) / reach.dt
                 return Answer(candidate, given_up, iterations)
         stride.hold()
-        self._turning = np.zeros(3)
+        self._turning, self._moving = np.zeros(3), np.zeros(3)
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
     def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
@@ -106,8 +111,8 @@ class Planted:
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
         free = np.full(3, np.inf)
-        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free)
-        calm = goal._replace(turn_low=self._turn_bounds(reach.dt)[0], turn_high=self._turn_bounds(reach.dt)[1])
+        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free, -free, free)
+        calm = goal if reach.dt == 0.0 else self._calmed(goal, reach.dt)
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
@@ -129,13 +134,12 @@ class Planted:
                 return iterations, True
         return iterations, False
 
-    def _turn_bounds(self, dt: float) -> tuple[Array, Array]:
-        """Least and largest rotation (3,) rad of the torso in a frame of dt s; none while the robot is being placed."""
-        if dt == 0.0:
-            return np.full(3, -np.inf), np.full(3, np.inf)
-        most, change = self._calm.turn_speed * dt, self._calm.turn_acceleration * dt * dt
-        coasting = self._turning * dt
-        return np.clip(coasting - change, -most, most), np.clip(coasting + change, -most, most)
+    def _calmed(self, goal: LegGoal, dt: float) -> LegGoal:
+        """The goal with the torso's bounds of speed and acceleration for a frame of dt s."""
+        calm = self._calm
+        turn = _bounds(self._turning, calm.turn_speed, calm.turn_acceleration, dt)
+        move = _bounds(self._moving, calm.speed, calm.acceleration, dt)
+        return goal._replace(turn_low=turn[0], turn_high=turn[1], move_low=move[0], move_high=move[1])
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
@@ -162,6 +166,12 @@ class Planted:
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
         middle = heading(rotation) * 0.5
         R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
-        self._turning = np.zeros(3)
+        self._turning, self._moving = np.zeros(3), np.zeros(3)
         stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
         return self._maker.hang(pose.q, 1, stride.planted_pos, stride.planted_rot)
+
+
+def _bounds(velocity: Array, speed: float, acceleration: float, dt: float) -> tuple[Array, Array]:
+    """Least and largest way (3,) in dt s of something that moves at ``velocity`` (3,)."""
+    coasting, change, most = velocity * dt, acceleration * dt * dt, speed * dt
+    return np.clip(coasting - change, -most, most), np.clip(coasting + change, -most, most)
