@@ -132,7 +132,7 @@ class Imitator:
         limits, here = self.settings.limits, pose.soles_in_base - self._hips
         if self.mode is Mode.DOUBLE:
             self._feet.restart(here)
-        wanted = self._feet.step(targets[FEET], dt)
+        wanted = targets[FEET] if self.mode is Mode.DOUBLE else self._feet.step(targets[FEET], dt)
         return np.asarray(
             limited_step(here, self._feet_velocity, wanted, dt, limits.foot_speed, limits.foot_acceleration)
         )
