@@ -11,6 +11,7 @@ from naoimitate.balance.legs import table_bounds
 from naoimitate.balance.clearance import Clearance
 from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.pose import Pose
+from naoimitate.balance.retarget import Reach
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.observer import Observation
 from naoimitate.ik import SOLVED, bounded_step
@@ -20,6 +21,8 @@ from naoimitate.robot.model import RobotModel
 
 Array = npt.NDArray[np.float64]
 
+Task = tuple[Array, Array, Array, int]
+"""Of an arm: target (3,) m, elbow direction (3,), tip rotation (3, 3), and how many of its rows count."""
 _ORIENTATION_ROWS = {"free": 0, "upright": 2, "follow": 3}
 _PALM = (yaw_matrix(np.pi / 2), yaw_matrix(-np.pi / 2))
 """Torso from hand link in a T-pose: the links point along x, the human's arms along +-y."""
@@ -31,6 +34,8 @@ BRANCH_PERIOD = 12
 """Frames between two looks for a better arm posture."""
 BRANCH_SPEED = 0.6
 """Share of the joints' speed limit at which an arm changes its posture."""
+BRANCH_BRAKING = 20.0
+"""[rad/s^2] with which it comes to rest there."""
 BRANCH_NEAR = 0.1
 """[rad] from the other posture at which the hand is followed again."""
 
@@ -75,7 +80,7 @@ class Arms:
         clearance.look(pose)
         for _ in range(steps):
             low, high = pose.q - SETTLE_STEP, pose.q + SETTLE_STEP
-            q, _ = self.solve(pose, targets, seen, low, high, clearance)
+            q, _ = self.solve(pose, targets, seen, Reach(0.0, low, high, low, high), clearance)
             self.head(q, seen.head, SETTLE_STEP, low, high)
             link_pos, link_rot = pose.link_pos.copy(), pose.link_rot.copy()
             forward(self._robot.tree, q, link_pos, link_rot)
@@ -83,7 +88,7 @@ class Arms:
             clearance.look(pose)
         return pose.q
 
-    def solve(self, pose: Pose, targets: Array, seen: Observation, low: Array, high: Array, clearance: Clearance) -> tuple[Array, int]:
+    def solve(self, pose: Pose, targets: Array, seen: Observation, reach: Reach, clearance: Clearance) -> tuple[Array, int]:
         """Joint angles (J,) with both arms moved towards targets (2, 3) m, and the iterations it took."""
         q, iterations = pose.q.copy(), 0
         self._frames += 1
@@ -91,16 +96,23 @@ class Arms:
             task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
             rows = clearance.limb_rows(pose, limb.joints)
             if self._paper is not None:
-                iterations += self._as_published(self._paper, limb, targets[side], q, low, high, *rows)
+                iterations += self._as_published(self._paper, limb, targets[side], q, reach.low, reach.high, *rows)
                 continue
             if self._branch[side] is not None:
-                iterations += self._change_branch(side, q, task, low, high, rows)
+                iterations += self._change_branch(side, q, task, reach, rows)
                 continue
-            done, error, misfit = solve_limb(self._robot.tree, limb, self._weights, *task, q, low, high, *rows)
+            done, error, misfit = self._follow(limb, task, q, reach, rows)
             iterations += done
             if error > BRANCH_GAIN and self._frames % BRANCH_PERIOD == side:
                 iterations += self._look_for_branch(side, q, task, misfit)
         return q, iterations
+
+    def _follow(self, limb: Limb, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]) -> tuple[int, float, float]:
+        """One frame of a limb, smooth where the body does not forbid it: (iterations, tip error m, misfit m)."""
+        found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
+        if found[0] == 0:
+            found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.low, reach.high, *rows)
+        return found
 
     def _as_published(self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array) -> int:
         """The paper's iterations, then the nearest angles within speed, range and clear of the body (section V-D)."""
@@ -114,7 +126,7 @@ class Arms:
         q[limb.joints] = before + (step if solved else 0.0)
         return ik.arm_iterations
 
-    def _look_for_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], misfit: float) -> int:
+    def _look_for_branch(self, side: int, q: Array, task: Task, misfit: float) -> int:
         """Start afresh from other postures; keep the best arm posture that fits clearly better."""
         limb, iterations = self._limbs[side], 0
         for seed in self._seeds[side]:
@@ -126,14 +138,19 @@ class Arms:
                 misfit, self._branch[side] = found, trial[limb.joints]
         return iterations
 
-    def _change_branch(self, side: int, q: Array, task: tuple[Array, Array, Array, int], low: Array, high: Array, rows: tuple[Array, Array]) -> int:
+    def _change_branch(self, side: int, q: Array, task: Task, reach: Reach, rows: tuple[Array, Array]) -> int:
         """Move an arm of q through joint space towards its other posture, until that is near."""
         limb, goal = self._limbs[side], q.copy()
         goal[limb.joints] = self._branch[side]
         done, _, _ = solve_limb(self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side])
+        if reach.dt == 0.0:
+            q[limb.joints], self._branch[side] = goal[limb.joints], None
+            return done
         way = limb._replace(rest=goal[limb.joints])
         before = q[limb.joints]
-        slow_low, slow_high = q + BRANCH_SPEED * (low - q), q + BRANCH_SPEED * (high - q)
+        most = np.minimum(BRANCH_SPEED * (reach.high - q), np.sqrt(2.0 * BRANCH_BRAKING * np.abs(goal - q)) * reach.dt)
+        slow_low = np.clip(q - most, reach.smooth_low, reach.smooth_high)
+        slow_high = np.clip(q + most, reach.smooth_low, reach.smooth_high)
         free = (task[0], np.zeros(3), task[2], 0)
         more, _, _ = solve_limb(self._robot.tree, way, self._transit, *free, q, slow_low, slow_high, *rows)
         near = np.abs(q[limb.joints] - way.rest).max() < BRANCH_NEAR

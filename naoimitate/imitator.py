@@ -34,6 +34,8 @@ Array = npt.NDArray[np.float64]
 
 HANDS, FEET = np.array([0, 2]), np.array([1, 3])
 """Rows of a posture (1)."""
+FARTHEST = 1.5
+"""Limb lengths from its root beyond which the target of a hand or foot is an error of the source."""
 SETTLE_STEPS = 60
 NOTICEABLE = 0.005
 """[m] by which a hand or foot must miss its target to count as given up."""
@@ -45,10 +47,11 @@ class Imitator:
     def __init__(self, robot: RobotModel, settings: Settings | None = None) -> None:
         self.robot, self.settings = robot, settings or Settings()
         s = self.settings
-        legs = build_legs(robot, s.legs)
+        legs = self._legs = build_legs(robot, s.legs)
         self._clearance = Clearance(robot, s.clearance)
         self._maker = PoseMaker(robot, legs)
         self._hips = hip_positions(robot)
+        self._farthest = FARTHEST * np.array([robot.limb_length[limb] for limb in ("l_arm", "l_leg", "r_arm", "r_leg")])
         self._arms = Arms(robot, s.arm_weights, s.legs.range_reserve, s.hand_orientation, s.paper_ik)
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
@@ -91,7 +94,7 @@ class Imitator:
         if self._subject is None:
             raise CalibrationError("calibrate(frame) with a T-pose, or use(subject), before the first step")
         seen = self._observer.see(frame, support)
-        targets = self.mapping.targets(seen.body.posture)
+        targets = self._within_reach(self.mapping.targets(seen.body.posture))
         footing = self._footing(seen, targets, ahead, may_lift)
         if self._pose is None:
             given_up, iterations = self._start(seen, targets, footing), 0
@@ -103,13 +106,18 @@ class Imitator:
         self._last_time = frame.time
         return self._command(seen, footing, given_up, iterations)
 
+    def _within_reach(self, targets: Array) -> Array:
+        """Targets (4, 3) m, those brought back that are too far off to be meant: the solvers work with short ways."""
+        lengths = np.linalg.norm(targets, axis=1)
+        return np.asarray(targets * np.minimum(1.0, self._farthest / np.maximum(lengths, 1e-9))[:, None])
+
     def _advance(self, pose: Pose, seen: Observation, targets: Array, footing: Footing, dt: float) -> tuple[GivenUp, int]:
         """One frame: limited targets, arms and head, then the legs under them."""
         reach = self._reach(pose, dt)
         hands = self._hands.step(targets[HANDS], dt)
         feet = self._feet_step(pose, targets, dt)
         self._clearance.look(pose)
-        q, arm_iterations = self._arms.solve(pose, hands, seen, reach.low, reach.high, self._clearance)
+        q, arm_iterations = self._arms.solve(pose, hands, seen, reach, self._clearance)
         self._arms.head(q, seen.head, self.settings.limits.head_speed * dt, reach.low, reach.high)
         answer = self._retargeting.step(pose, q, feet, footing, reach)
         self._pose = answer.pose
@@ -120,12 +128,17 @@ class Imitator:
         return answer.given_up | self._missed(answer.pose, seen, targets, footing), arm_iterations + answer.iterations
 
     def _reach(self, pose: Pose, dt: float) -> Reach:
-        """The joint angles that a frame of dt s allows after a pose."""
+        """The joint angles that a frame of dt s allows after a pose: by speed, and by acceleration with room to brake."""
         limits = self.settings.limits
         turn = self.robot.speed * (limits.joint_share * dt)
         low, high = pose.q - turn, pose.q + turn
-        coasting, change = pose.q + self._velocity * dt, limits.joint_acceleration * dt * dt
-        return Reach(dt, low, high, np.clip(coasting - change, low, high), np.clip(coasting + change, low, high))
+        acceleration = np.where(self._legs.variable >= 0, limits.leg_acceleration, limits.arm_acceleration)
+        coasting, change = pose.q + self._velocity * dt, acceleration * dt * dt
+        brake_low = pose.q - dt * np.sqrt(2.0 * acceleration * np.maximum(pose.q - self._legs.lower, 0.0))
+        brake_high = pose.q + dt * np.sqrt(2.0 * acceleration * np.maximum(self._legs.upper - pose.q, 0.0))
+        smooth_low = np.clip(np.maximum(coasting - change, brake_low), low, np.minimum(high, brake_high))
+        smooth_high = np.clip(np.minimum(coasting + change, brake_high), np.maximum(low, brake_low), high)
+        return Reach(dt, low, high, smooth_low, smooth_high)
 
     def _feet_step(self, pose: Pose, targets: Array, dt: float) -> Array:
         """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are."""

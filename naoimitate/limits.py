@@ -28,8 +28,10 @@ class TaskLimits:
     """[rad/s]."""
     joint_share: float = 0.85
     """Share of the motors' no-load speed that a joint may use."""
-    joint_acceleration: float = 60.0
+    leg_acceleration: float = 60.0
     """[rad/s^2] of a leg joint, wherever the feet allow it."""
+    arm_acceleration: float = 40.0
+    """[rad/s^2] of an arm joint, wherever the body does not stand in its way."""
     min_dt: float = 1e-4
     """[s], for frames that come at once."""
     max_dt: float = 0.05

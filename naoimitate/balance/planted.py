@@ -44,13 +44,13 @@ LANDING_WEIGHT = 0.3
 class CalmTorso:
     """How fast the torso may turn, wherever the feet allow it."""
 
-    turn_speed: float = 1.2
+    turn_speed: float = 1.0
     """[rad/s]."""
-    turn_acceleration: float = 10.0
+    turn_acceleration: float = 8.0
     """[rad/s^2]: with about 0.05 kg m^2 and 52 N that moves the ZMP of a small humanoid by 1 cm."""
-    speed: float = 0.25
+    speed: float = 0.2
     """[m/s]."""
-    acceleration: float = 2.0
+    acceleration: float = 1.5
     """[m/s^2]."""
 
 

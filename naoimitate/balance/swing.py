@@ -36,7 +36,7 @@ class SwingSettings:
     """[m] of straight lift before the foot may move sideways or tilt."""
     lift_speed: float = 0.12
     """[m/s] straight up."""
-    approach_speed: float = 0.3
+    approach_speed: float = 0.2
     """[m/s] over the floor to the landing place."""
     descend_speed: float = 0.06
     """[m/s] straight down, at most."""
@@ -44,8 +44,10 @@ class SwingSettings:
     """[m/s] at the floor."""
     touch_height: float = 0.0004
     """[m] above the floor at which the foot counts as carrying: servos that sag bring it down a moment early."""
-    acceleration: float = 2.0
-    """[m/s^2] up and over."""
+    lift_acceleration: float = 2.0
+    """[m/s^2] straight up."""
+    approach_acceleration: float = 1.0
+    """[m/s^2] over the floor."""
     descend_acceleration: float = 1.0
     """[m/s^2] down: a soft end, after which the robot does not sway."""
     turn_speed: float = 2.0
@@ -60,6 +62,8 @@ class SwingSettings:
     """[s] of approach after which a foot that does not arrive may come down near its place."""
     yielding: float = 0.01
     """[m/s] by which the distance that is near enough grows from then on."""
+    settled: float = 0.02
+    """[m/s] below which a foot over its landing place goes down."""
     arrived: float = 0.001
     """[m] and [rad * 0.1 m]: the foot is over its landing place, close enough to go straight down."""
 
@@ -96,7 +100,7 @@ class Swing:
             return position, yaw_matrix(goal_yaw), False
         if self.phase is Phase.DESCEND:
             return self._descend(position, rotation, dt)
-        return self._approach(position, rotation, goal, goal_yaw, dt)
+        return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
     def stop(self) -> None:
         """The last step was not taken: start again from rest."""
@@ -104,14 +108,14 @@ class Swing:
         self._turning = 0.0
 
     def _lift(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
-        speed = min(self._velocity[2] + self.settings.acceleration * dt, self.settings.lift_speed)
+        speed = min(self._velocity[2] + self.settings.lift_acceleration * dt, self.settings.lift_speed)
         self._velocity[:] = (0.0, 0.0, speed)
         height = position[2] + speed * dt
         if height >= self.settings.lift_height:
             self.phase, self.min_height = Phase.FREE, self.settings.lift_height * 0.9
         return np.array([self._start[0], self._start[1], height]), self._rotation, False
 
-    def _approach(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, dt: float) -> tuple[Array, Array, bool]:
+    def _approach(self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
         self.min_height = min(self.settings.clearance - OVERHEAD, self.min_height + self.settings.lift_speed * dt)
         target = np.array([goal[0], goal[1], self.settings.clearance])
@@ -120,7 +124,8 @@ class Swing:
         way, angle = target - position, float(np.linalg.norm(turn))
         self._waited += dt
         near = self.settings.arrived + self.settings.yielding * max(self._waited - self.settings.patience, 0.0)
-        if np.linalg.norm(way) < near and 0.1 * angle < near:
+        settled = np.linalg.norm(moved) < self.settings.settled * dt or self._waited > self.settings.patience
+        if np.linalg.norm(way) < near and 0.1 * angle < near and settled:
             self.phase = Phase.DESCEND
             self._start = position.copy()
             self._velocity[:] = 0.0
@@ -140,12 +145,12 @@ class Swing:
         distance = float(np.linalg.norm(way))
         if distance == 0.0:
             return way
-        half = 0.5 * self.settings.acceleration * dt
-        speed = min(math.sqrt(half * half + 2.0 * self.settings.acceleration * distance) - half, self.settings.approach_speed)
+        half = 0.5 * self.settings.approach_acceleration * dt
+        speed = min(math.sqrt(half * half + 2.0 * self.settings.approach_acceleration * distance) - half, self.settings.approach_speed)
         change = speed * way / distance - self._velocity
         length = float(np.linalg.norm(change))
-        if length > self.settings.acceleration * dt:
-            change *= self.settings.acceleration * dt / length
+        if length > self.settings.approach_acceleration * dt:
+            change *= self.settings.approach_acceleration * dt / length
         self._velocity += change
         step = self._velocity * dt
         return way if np.linalg.norm(step - way) < 1e-5 else step
