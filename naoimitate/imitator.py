@@ -141,7 +141,12 @@ class Imitator:
         return Reach(dt, low, high, smooth_low, smooth_high)
 
     def _feet_step(self, pose: Pose, targets: Array, dt: float) -> Array:
-        """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are."""
+        """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are.
+
+        The published mapping goes on from its own last answer: from shifted feet, shifts would add up.
+        """
+        if self.settings.retarget != "planted":
+            return self._feet.step(targets[FEET], dt)
         limits, here = self.settings.limits, pose.soles_in_base - self._hips
         if self.mode is Mode.DOUBLE:
             self._feet.restart(here)

@@ -28,7 +28,7 @@ class Direct:
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
         self._robot, self._maker, self._planted, self._ik = robot, maker, planted, ik
         self._rows = legs.sole_joint + 1
-        self._limbs = [uncoupled_leg(robot, side) for side in "lr"]
+        self._limbs = [uncoupled_leg(robot, legs, side) for side in "lr"]
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """The stand of frame 0; see ``Planted.place``."""

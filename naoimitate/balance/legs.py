@@ -72,7 +72,7 @@ class LegWeights(NamedTuple):
     """[m] of CoM error along x and y that nothing may exceed (or increase, where it is already larger)."""
     still: float = 0.3
     """Of the torso's own motion over the floor in a frame: it goes no faster than the feet's targets need."""
-    still_reaching: float = 1.0
+    still_reaching: float = 2.0
     """The same while a foot reaches for its landing place: the foot then waits for the torso."""
     reach: float = 4.0
     """Of the sole's place in the world on its way to a landing."""

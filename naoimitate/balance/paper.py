@@ -11,7 +11,6 @@ the legs cannot reach are asked for nearer to the stand, so that balance is neve
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,7 +21,8 @@ from naoimitate.balance.offset import OffsetLaw, advance
 from naoimitate.balance.planted import SCALES, Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
-from naoimitate.balance.soles import SoleGoal, into_tables, shortened, soles_and_com, solve_soles, uncoupled_leg
+from naoimitate.balance.shift import levelled, offset_in_space, parted, shifted, swung, up_vector
+from naoimitate.balance.soles import SoleGoal, Soles, into_tables, shortened, soles_at, solve_soles, uncoupled_leg
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
@@ -36,6 +36,8 @@ TOUCHDOWN = 0.005
 """[m] off the floor at which a landing foot counts as down: what 1 mm and 0.033 rad over 0.1 m between the feet leave."""
 SWING_CLEARANCE = 0.008
 """[m] of a swing sole's lowest point above the floor: 5 mm, and what the tolerances of the solve take from it."""
+FEET_APART = 0.010
+"""[m] kept between the soles' inner edges: what shifting one of them sideways may take, and 5 mm."""
 SHARE_SPEED = 1.0
 """[1/s] at which the share of the mapped feet in the request grows, or shrinks while the legs cannot reach it."""
 
@@ -55,48 +57,12 @@ class PaperIk:
     """The paper's longest solve took 1784."""
 
 
-def shift_factor(foot: Array, other: Array, com: Array, offset: float) -> float:
-    """The s of smallest magnitude that solves o(p_L + s (p_CoM - p_L)) = o' for the foot at offset 0.
-
-    foot, other, com: (3,) m in one frame; offset: o', counted from ``foot`` to ``other``. With v = p_CoM - p_L and
-    d = p_R - p_L: (1 - o') v.v s^2 + (2 o' v.d - v.d - v.v) s + (v.d - o' d.d) = 0. Where it has no real root, the s
-    that comes nearest.
-    """
-    v, d = com - foot, other - foot
-    vv, vd, dd = float(v @ v), float(v @ d), float(d @ d)
-    a, b, c = (1.0 - offset) * vv, (2.0 * offset - 1.0) * vd - vv, vd - offset * dd
-    if abs(a) < 1e-12:
-        return -c / b if abs(b) > 1e-12 else 0.0
-    root = math.sqrt(max(b * b - 4.0 * a * c, 0.0))
-    return min((-b - root) / (2.0 * a), (-b + root) / (2.0 * a), key=abs)
-
-
-def shifted(soles: Array, com: Array, offset: float) -> Array:
-    """Section V-C 1: soles (2, 3) m with the left one shifted towards the CoM where o' < o, else the right one."""
-    left, right = soles
-    if offset < offset_in_space(left, right, com):
-        return np.array([left + shift_factor(left, right, com, offset) * (com - left), right])
-    return np.array([left, right + shift_factor(right, left, com, 1.0 - offset) * (com - right)])
-
-
-def up_vector(left: Array, right: Array, com: Array, offset: float) -> Array:
-    """Equation (7): the soles' common normal n = p_CoM - (p_L + o' (p_R - p_L)), as a unit vector (3,)."""
-    n = com - (left + offset * (right - left))
-    return np.asarray(n / max(float(np.linalg.norm(n)), 1e-9))
-
-
-def offset_in_space(left: Array, right: Array, com: Array) -> float:
-    """Equation (6) with positions (3,) m in the torso frame."""
-    d = right - left
-    return float((com - left) @ d / max(float(d @ d), 1e-9))
-
-
 class PaperFeet:
     """The published stabilisation. It shares frame 0 with ``planted``."""
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, gate: Gate, law: OffsetLaw, ik: PaperIk, foot_speed: float) -> None:
         self._tree, self._maker, self._planted, self._gate = robot.tree, maker, planted, gate
-        self._legs, self._limbs = legs, [uncoupled_leg(robot, side) for side in "lr"]
+        self._legs, self._limbs = legs, [uncoupled_leg(robot, legs, side) for side in "lr"]
         self._leg_joints = np.concatenate([limb.joints for limb in self._limbs])
         self._law, self._ik, self._foot_speed = law, ik, foot_speed
         self._stand = maker.stand(robot.postures["stand"]).soles_in_base - legs.hip
@@ -108,6 +74,7 @@ class PaperFeet:
         self._offset, self._speed = self._planted.offset, 0.0
         self._mapped = pose.q[self._leg_joints]
         self._between = wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1]))
+        self._apart = FEET_APART - sum(s * self._inner_edge(k, s * 0.5 * self._between) for k, s in enumerate((1, -1)))
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
         return pose
 
@@ -124,25 +91,53 @@ class PaperFeet:
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: mapped feet, the offset of this frame, one foot shifted, both turned to the ground."""
         offset, speed = self._next_offset(pose, footing, reach.dt)
-        mapped = self._mapped_soles(q_arms, self._stand + self._share * (feet - self._stand))
-        soles, com = soles_and_com(self._tree, self._legs, q_arms)
-        single = self.mode is not Mode.DOUBLE and not self.mode.landing
-        places = self._raised(mapped, com, pose) if single else shifted(mapped, com, offset)
-        turned = np.array([self.mode.stance != "R" or self.mode.landing, self.mode.stance != "L" or self.mode.landing])
-        q, ik = q_arms.copy(), self._ik
-        goal = SoleGoal(places, up_vector(*places, com, offset), turned, self._between)
-        tolerance = ik.position_tolerance, ik.angle_tolerance
-        used, _ = solve_soles(self._tree, self._legs, goal, q, ik.damping, *tolerance, ik.max_iterations)
-        way = float(np.linalg.norm(soles_and_com(self._tree, self._legs, q)[0] - soles, axis=1).max())
-        near = min(1.0, self._foot_speed * reach.dt / max(way, 1e-9))
-        self._hang_on(self._base_side(mapped, com, offset), pose)
+        now = soles_at(self._tree, self._legs, q_arms)
+        mapped = self._mapped_soles(q_arms, self._stand + self._share * (feet - self._stand))._replace(com=now.com)
+        self._hang_on(self._base_side(mapped, offset), pose)
+        q = q_arms.copy()
+        iterations = self._solve(q, mapped, offset)
+        way = np.linalg.norm(soles_at(self._tree, self._legs, q).centres - now.centres, axis=1).max()
+        near = min(1.0, self._foot_speed * reach.dt / max(float(way), 1e-9))
         q = shortened(pose.q, q_arms + near * (q - q_arms), reach.low, reach.high)
-        answer = self._taken(pose, q, (offset, speed), reach.dt, used + 2 * ik.leg_iterations)
-        flat = self._flat(answer.pose)
+        taken, part = self._taken(pose, q, (offset, speed), reach.dt)
+        flat = self._flat(taken)
         self._landed = self.mode.landing and flat
-        good = not answer.given_up and (single or flat or near < 1.0)
+        good = part == 1.0 and (flat or near < 1.0 or self._single)
         self._share = min(max(self._share + (SHARE_SPEED if good else -SHARE_SPEED) * reach.dt, 0.0), 1.0)
-        return answer
+        return Answer(taken, GivenUp(0) if part > 0.0 else GivenUp.HOLD, iterations + 2 * self._ik.leg_iterations)
+
+    def _solve(self, q: Array, soles: Soles, offset: float) -> int:
+        """Put the soles of q (J,) rad where section V-C wants them; the iterations it took.
+
+        Where a joint's limit keeps them from there, a second solve turns them to the ground where they have come to.
+        """
+        ik, used = self._ik, 0
+        for again in (False, True):
+            goal = self._goal(soles, offset, again)
+            tolerance = ik.position_tolerance, ik.angle_tolerance
+            more, arrived = solve_soles(self._tree, self._legs, goal, q, ik.damping, *tolerance, ik.max_iterations)
+            used += more
+            if arrived:
+                break
+            soles = soles_at(self._tree, self._legs, q)
+        return used
+
+    def _goal(self, soles: Soles, offset: float, again: bool) -> SoleGoal:
+        """Section V-C for soles as they were mapped, or ``again`` for soles that have come as near as they can."""
+        if not self._single:
+            places = (
+                levelled(soles.centres, soles.com, offset, self._side)
+                if again
+                else shifted(soles.centres, soles.com, offset)
+            )
+            return SoleGoal(places, np.tile(up_vector(*places, soles.com, offset), (2, 1)), True, self._between)
+        outline = self._legs.outline[1 - self._side] - self._legs.centre[1 - self._side]
+        places, normals = swung(*soles, self._side, outline, SWING_CLEARANCE)
+        return SoleGoal(places, normals, False, self._between)
+
+    @property
+    def _single(self) -> bool:
+        return self.mode is not Mode.DOUBLE and not self.mode.landing
 
     def _next_offset(self, pose: Pose, footing: Footing, dt: float) -> tuple[float, float]:
         """The support machine takes its transition; the offset o' of this frame and its speed, 1/s (section V-A)."""
@@ -154,31 +149,26 @@ class PaperFeet:
         limit = self._law.acceleration(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]))
         return advance(self._offset, self._speed, target, dt, self._law, limit)
 
-    def _mapped_soles(self, q_arms: Array, feet: Array) -> Array:
-        """Centres of the soles (2, 3) m in the torso frame where the posture mapping puts them."""
+    def _mapped_soles(self, q_arms: Array, feet: Array) -> Soles:
+        """The soles where the posture mapping puts them, feet (2, 3) m from the hips; beside each other, not inside."""
         q = q_arms.copy()
         q[self._leg_joints] = self._mapped
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
         self._mapped = q[self._leg_joints]
-        return soles_and_com(self._tree, self._legs, q)[0]
+        soles = soles_at(self._tree, self._legs, q)
+        return soles._replace(centres=parted(soles.centres, self._apart))
 
-    def _raised(self, soles: Array, com: Array, pose: Pose) -> Array:
-        """Single support: soles (2, 3) m with the swing foot off the floor, which is the plane of the stance sole."""
-        stance, swing = (0, 1) if self.mode.stance == "L" else (1, 0)
-        up = com - soles[stance]
-        up = up / np.linalg.norm(up)
-        corners = (self._legs.outline[swing] - self._legs.centre[swing]) @ pose.sole_rot[swing, 2, :2]
-        height = float((soles[swing] - soles[stance]) @ up)
-        raised = soles.copy()
-        raised[swing] += max(0.0, SWING_CLEARANCE - float(corners.min()) - height) * up
-        return raised
+    def _inner_edge(self, foot: int, yaw: float) -> float:
+        """y of the sole's inner edge from its centre, m, when the sole is turned by ``yaw`` rad."""
+        y = ((self._legs.outline[foot] - self._legs.centre[foot]) @ yaw_matrix(yaw)[:2, :2].T)[:, 1]
+        return float(y.min() if foot == 0 else y.max())
 
-    def _base_side(self, soles: Array, com: Array, offset: float) -> int:
+    def _base_side(self, soles: Soles, offset: float) -> int:
         """The foot that is not shifted: the right one when o' < o, else the left one; in single support the stance."""
         if self.mode is not Mode.DOUBLE:
             return 0 if self.mode.stance == "L" else 1
-        return 1 if offset < offset_in_space(soles[0], soles[1], com) else 0
+        return 1 if offset < offset_in_space(*soles.centres, soles.com) else 0
 
     def _hang_on(self, side: int, pose: Pose) -> None:
         """From now on the robot hangs on sole ``side``, flat where it is."""
@@ -187,8 +177,8 @@ class PaperFeet:
             self._stance_pos[side] = pose.sole_pos[side] * [1.0, 1.0, 0.0]
             self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
 
-    def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float, iterations: int) -> Answer:
-        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first."""
+    def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float) -> tuple[Pose, float]:
+        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first; and which part, 0 to 1."""
         stances = (self.mode.stance != "R", self.mode.stance != "L")
         for part in SCALES:
             q_part = pose.q + part * (q - pose.q)
@@ -197,9 +187,9 @@ class PaperFeet:
             if self._gate.passes(candidate, pose, stances, candidate.sole_pos, candidate.sole_rot, dt):
                 self._offset += part * (offset[0] - self._offset)
                 self._speed = offset[1] if part == 1.0 else 0.0
-                return Answer(candidate, GivenUp(0), iterations)
+                return candidate, part
         self._speed = 0.0
-        return Answer(pose, GivenUp.HOLD, iterations)
+        return pose, 0.0
 
     def _flat(self, pose: Pose) -> bool:
         """Whether the sole on which the robot does not hang lies on the floor as well."""

@@ -52,6 +52,8 @@ class CalmTorso:
     """[m/s]."""
     acceleration: float = 1.5
     """[m/s^2]."""
+    on_one_foot: float = 0.5
+    """Share of all of these on one foot."""
 
 
 class Planted:
@@ -136,9 +138,9 @@ class Planted:
 
     def _calmed(self, goal: LegGoal, dt: float) -> LegGoal:
         """The goal with the torso's bounds of speed and acceleration for a frame of dt s."""
-        calm = self._calm
-        turn = _bounds(self._turning, calm.turn_speed, calm.turn_acceleration, dt)
-        move = _bounds(self._moving, calm.speed, calm.acceleration, dt)
+        calm, share = self._calm, self._calm.on_one_foot if self._stride.swinging else 1.0
+        turn = _bounds(self._turning, share * calm.turn_speed, share * calm.turn_acceleration, dt)
+        move = _bounds(self._moving, share * calm.speed, share * calm.acceleration, dt)
         return goal._replace(turn_low=turn[0], turn_high=turn[1], move_low=move[0], move_high=move[1])
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
@@ -174,4 +176,5 @@ class Planted:
 def _bounds(velocity: Array, speed: float, acceleration: float, dt: float) -> tuple[Array, Array]:
     """Least and largest way (3,) in dt s of something that moves at ``velocity`` (3,)."""
     coasting, change, most = velocity * dt, acceleration * dt * dt, speed * dt
-    return np.clip(coasting - change, -most, most), np.clip(coasting + change, -most, most)
+    low, high = np.maximum(coasting - change, -most), np.minimum(coasting + change, most)
+    return np.minimum(low, np.maximum(coasting - change, high)), np.maximum(high, np.minimum(coasting + change, low))

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from naoimitate.balance.legs import LegLimits, Legs, reduce_columns, table_bounds
+from naoimitate.balance.legs import Legs, reduce_columns, table_bounds
 from naoimitate.ik import damped_step, limit_avoiding_weights
 from naoimitate.limb import Limb, build_limb
 from naoimitate.robot.kernel import angular_jacobian, center_of_mass, forward, point_jacobian
@@ -28,24 +28,32 @@ STALLED = 1e-5
 """[rad] of the largest joint movement in an iteration below which a solve has come as near as it can."""
 
 
+class Soles(NamedTuple):
+    """Both soles in the torso frame: centres of their outlines (2, 3) m, frames (2, 3, 3); and the CoM (3,) m there."""
+
+    centres: Array
+    frames: Array
+    com: Array
+
+
 class SoleGoal(NamedTuple):
     """What is asked of both soles, in the torso frame.
 
-    places: (2, 3) m of their centres. normal: (3,) of the soles that are ``turned``, (2,) bool. between: rad, the left
-    sole's heading from the right one's, where both are turned.
+    places: (2, 3) m of their centres. normals: (2, 3). between: rad, the left sole's heading from the right one's,
+    asked for where both soles are ``down``.
     """
 
     places: Array
-    normal: Array
-    turned: npt.NDArray[np.bool_]
+    normals: Array
+    down: bool
     between: float
 
 
-def uncoupled_leg(robot: RobotModel, side: str) -> Limb:
-    """A leg whose shared joints are held, so that one leg's solution does not move the other."""
-    limb = build_limb(robot, f"{side}_leg", LegLimits().range_reserve)
-    keep = ~np.isin(limb.joints, robot.coupled)
-    return limb._replace(joints=limb.joints[keep], lower=limb.lower[keep], upper=limb.upper[keep], rest=limb.rest[keep])
+def uncoupled_leg(robot: RobotModel, legs: Legs, side: str) -> Limb:
+    """A leg within the limits of ``legs``, its shared joints held, so that its solution does not move the other one."""
+    limb = build_limb(robot, f"{side}_leg", 0.0)
+    joints = limb.joints[~np.isin(limb.joints, robot.coupled)]
+    return limb._replace(joints=joints, lower=legs.lower[joints], upper=legs.upper[joints], rest=legs.rest[joints])
 
 
 def shortened(before: Array, q: Array, low: Array, high: Array) -> Array:
@@ -57,16 +65,17 @@ def shortened(before: Array, q: Array, low: Array, high: Array) -> Array:
 
 
 @njit(cache=True)
-def soles_and_com(tree: Tree, legs: Legs, q: Array) -> tuple[Array, Array]:
-    """Centres of the sole outlines (2, 3) m and CoM (3,) m in the torso frame at q (J,) rad."""
+def soles_at(tree: Tree, legs: Legs, q: Array) -> Soles:
+    """The soles and the CoM at q (J,) rad."""
     count = q.shape[0]
     pos, rot = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
-    centres, com = np.empty((2, 3)), np.empty(3)
+    soles = Soles(np.empty((2, 3)), np.empty((2, 3, 3)), np.empty(3))
     forward(tree, q, pos, rot)
-    center_of_mass(tree, pos, rot, com)
+    center_of_mass(tree, pos, rot, soles.com)
     for k in range(2):
-        centres[k] = sole_centre(legs, k, pos, rot)
-    return centres, com
+        soles.centres[k] = sole_centre(legs, k, pos, rot)
+        soles.frames[k] = rot[legs.sole_joint[k] + 1]
+    return soles
 
 
 @njit(cache=True)
@@ -124,13 +133,13 @@ def _errors(tree: Tree, legs: Legs, goal: SoleGoal, pos: Array, rot: Array, A: A
         angular_jacobian(tree, pos, rot, row - 1, J)
         reduce_columns(J, legs, W[k])
         e[place] = goal.places[k] - centre
-        if goal.turned[k]:
-            A[turn] = W[k]
-            e[turn] = np.cross(rot[row][:, 2], goal.normal)
+        A[turn] = W[k]
+        e[turn] = np.cross(rot[row][:, 2], goal.normals[k])
         arrived = arrived and np.linalg.norm(e[place]) < near and np.linalg.norm(e[turn]) < angle
-    if goal.turned.all():
-        A[12] = goal.normal @ (W[0] - W[1])
-        e[12] = goal.between - angle_between(legs, rot, goal.normal)
+    if goal.down:
+        up = np.ascontiguousarray(goal.normals[0])
+        A[12] = up @ (W[0] - W[1])
+        e[12] = goal.between - angle_between(legs, rot, up)
     return arrived and abs(e[12]) < angle
 
 
@@ -138,7 +147,7 @@ def _errors(tree: Tree, legs: Legs, goal: SoleGoal, pos: Array, rot: Array, A: A
 def angle_between(legs: Legs, rot: Array, normal: Array) -> float:
     """The left sole's heading about ``normal`` (3,), from the right sole's, rad."""
     left, right = rot[legs.sole_joint[0] + 1][:, 0], rot[legs.sole_joint[1] + 1][:, 0]
-    return float(np.arctan2(np.dot(np.cross(right, left), normal), np.dot(right, left)))
+    return float(np.arctan2((np.cross(right, left) * normal).sum(), (right * left).sum()))
 
 
 @njit(cache=True)
