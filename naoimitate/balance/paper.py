@@ -60,7 +60,17 @@ class PaperIk:
 class PaperFeet:
     """The published stabilisation. It shares frame 0 with ``planted``."""
 
-    def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, gate: Gate, law: OffsetLaw, ik: PaperIk, foot_speed: float) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        legs: Legs,
+        maker: PoseMaker,
+        planted: Planted,
+        gate: Gate,
+        law: OffsetLaw,
+        ik: PaperIk,
+        foot_speed: float,
+    ) -> None:
         self._tree, self._maker, self._planted, self._gate = robot.tree, maker, planted, gate
         self._legs, self._limbs = legs, [uncoupled_leg(robot, legs, side) for side in "lr"]
         self._leg_joints = np.concatenate([limb.joints for limb in self._limbs])
@@ -142,7 +152,11 @@ class PaperFeet:
     def _next_offset(self, pose: Pose, footing: Footing, dt: float) -> tuple[float, float]:
         """The support machine takes its transition; the offset o' of this frame and its speed, 1/s (section V-A)."""
         given = SupportInput(
-            human=footing.support, offset=self._offset, landed=self._landed, ahead=footing.ahead, may_lift=footing.may_lift
+            human=footing.support,
+            offset=self._offset,
+            landed=self._landed,
+            ahead=footing.ahead,
+            may_lift=footing.may_lift,
         )
         target = offset_target(self._fsm.step(given), given, footing.offset)
         centres = self._maker.centres(pose.sole_pos, pose.sole_rot)

@@ -119,7 +119,9 @@ def solve_soles(
 
 
 @njit(cache=True)
-def _errors(tree: Tree, legs: Legs, goal: SoleGoal, pos: Array, rot: Array, A: Array, e: Array, near: float, angle: float) -> bool:
+def _errors(
+    tree: Tree, legs: Legs, goal: SoleGoal, pos: Array, rot: Array, A: Array, e: Array, near: float, angle: float
+) -> bool:
     """Fill the rows A (13, n) and errors e (13,): place and normal of each sole, headings; whether all are small."""
     n, J = A.shape[1], np.empty((3, tree.parent.shape[0]))
     W = np.empty((2, 3, n))
