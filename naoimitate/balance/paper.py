@@ -33,7 +33,7 @@ from naoimitate.robot.model import RobotModel
 Array = npt.NDArray[np.float64]
 
 TOUCHDOWN = 0.005
-"""[m] off the floor at which a landing foot counts as down: what 1 mm and 0.033 rad over 0.1 m between the feet leave."""
+"""[m] off the floor at which a landing foot counts as down: what 1 mm and 0.033 rad leave over 0.1 m."""
 SWING_CLEARANCE = 0.008
 """[m] of a swing sole's lowest point above the floor: 5 mm, and what the tolerances of the solve take from it."""
 FEET_APART = 0.010
@@ -84,7 +84,8 @@ class PaperFeet:
         self._offset, self._speed = self._planted.offset, 0.0
         self._mapped = pose.q[self._leg_joints]
         self._between = wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1]))
-        self._apart = FEET_APART - sum(s * self._inner_edge(k, s * 0.5 * self._between) for k, s in enumerate((1, -1)))
+        half = 0.5 * self._between
+        self._apart = FEET_APART - self._inner_edge(0, half) + self._inner_edge(1, -half)
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
         return pose
 
@@ -134,16 +135,13 @@ class PaperFeet:
 
     def _goal(self, soles: Soles, offset: float, again: bool) -> SoleGoal:
         """Section V-C for soles as they were mapped, or ``again`` for soles that have come as near as they can."""
-        if not self._single:
-            places = (
-                levelled(soles.centres, soles.com, offset, self._side)
-                if again
-                else shifted(soles.centres, soles.com, offset)
-            )
-            return SoleGoal(places, np.tile(up_vector(*places, soles.com, offset), (2, 1)), True, self._between)
-        outline = self._legs.outline[1 - self._side] - self._legs.centre[1 - self._side]
-        places, normals = swung(*soles, self._side, outline, SWING_CLEARANCE)
-        return SoleGoal(places, normals, False, self._between)
+        if self._single:
+            outline = self._legs.outline[1 - self._side] - self._legs.centre[1 - self._side]
+            places, normals = swung(*soles, self._side, outline, SWING_CLEARANCE)
+            return SoleGoal(places, normals, False, self._between)
+        centres, com = soles.centres, soles.com
+        places = levelled(centres, com, offset, self._side) if again else shifted(centres, com, offset)
+        return SoleGoal(places, np.tile(up_vector(*places, com, offset), (2, 1)), True, self._between)
 
     @property
     def _single(self) -> bool:
@@ -192,7 +190,7 @@ class PaperFeet:
             self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
 
     def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float) -> tuple[Pose, float]:
-        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first; and which part, 0 to 1."""
+        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first; and which part."""
         stances = (self.mode.stance != "R", self.mode.stance != "L")
         for part in SCALES:
             q_part = pose.q + part * (q - pose.q)

@@ -123,6 +123,7 @@ class Planted:
         ways = (
             (calm, reach.smooth_low, reach.smooth_high, rows[1]),
             (calm, reach.low, reach.high, rows[1]),
+            (_may_stop(calm), reach.low, reach.high, rows[1]),
             (goal, reach.low, reach.high, np.minimum(rows[1], 0.0)),
         )
         start, iterations = q.copy(), 0
@@ -178,3 +179,13 @@ def _bounds(velocity: Array, speed: float, acceleration: float, dt: float) -> tu
     coasting, change, most = velocity * dt, acceleration * dt * dt, speed * dt
     low, high = np.maximum(coasting - change, -most), np.minimum(coasting + change, most)
     return np.minimum(low, np.maximum(coasting - change, high)), np.maximum(high, np.minimum(coasting + change, low))
+
+
+def _may_stop(goal: LegGoal) -> LegGoal:
+    """The goal with a torso that may stop at once, as it must where a joint comes to its end."""
+    return goal._replace(
+        turn_low=np.minimum(goal.turn_low, 0.0),
+        turn_high=np.maximum(goal.turn_high, 0.0),
+        move_low=np.minimum(goal.move_low, 0.0),
+        move_high=np.maximum(goal.move_high, 0.0),
+    )

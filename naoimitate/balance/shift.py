@@ -14,7 +14,7 @@ LEVEL_BELOW = 0.030
 
 
 def offset_in_space(left: Array, right: Array, com: Array) -> float:
-    """Equation (6) with positions (3,) m: where the CoM's projection lies on the line from left to right foot, 0 to 1."""
+    """Equation (6) with positions (3,) m: where the CoM's projection lies from the left (0) to the right foot (1)."""
     d = right - left
     return float((com - left) @ d / max(float(d @ d), 1e-9))
 
@@ -29,7 +29,8 @@ def shift_factor(foot: Array, other: Array, com: Array, offset: float) -> float:
     """The s of smallest magnitude that solves o(p_L + s (p_CoM - p_L)) = o' for the foot at offset 0.
 
     foot, other, com: (3,) m; offset: o', counted from ``foot`` to ``other``. With v = p_CoM - p_L and d = p_R - p_L:
-    (1 - o') v.v s^2 + (2 o' v.d - v.d - v.v) s + (v.d - o' d.d) = 0. Where it has no real root, the s that comes nearest.
+    (1 - o') v.v s^2 + (2 o' v.d - v.d - v.v) s + (v.d - o' d.d) = 0. Where it has no real root, the s that comes
+    nearest.
     """
     v, d = com - foot, other - foot
     vv, vd, dd = float(v @ v), float(v @ d), float(d @ d)

@@ -1,8 +1,8 @@
 """Damped least squares that put both soles where they belong in the torso frame (Koenemann 2014, section V-C).
 
-Each foot is a problem of 5 degrees of freedom, a place and the sole's normal. One row more, the angle between the feet's
-headings, settles what a joint that the legs share is for: without it bent hips would turn the toes against each other.
-The iteration runs until the published tolerance is met. It knows the coupling tables as limits of the present moment,
+Each foot is a problem of 5 degrees of freedom, a place and the sole's normal. One row more, the angle between the
+headings of the feet, settles what a joint is for that the legs share: without it bent hips would turn the toes against
+each other. The iteration runs until the published tolerance is met. It knows the coupling tables as limits of the present moment,
 so that Chang and Dubey's weights keep it from pushing against them.
 """
 
