@@ -133,6 +133,13 @@ class Gate:
             and self.balanced(pose, before, stances)
         )
 
+    def safe(self, pose: Pose) -> bool:
+        """Whether a pose on both feet may be the first of all: in range, clear of itself and the floor, with margin."""
+        self._clearance.look(pose)
+        clear = self._clearance.nearest >= -self._limits.overlap
+        in_range = range_excess(self._model, pose.q) <= 0.0
+        return clear and in_range and self.margin(pose, (True, True)) >= self._limits.margin
+
     def moves(self, pose: Pose, before: Pose, fixed: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float) -> bool:
         """Whether ranges and speeds hold, and the ``fixed`` soles stay where they are planted."""
         limits = self._limits

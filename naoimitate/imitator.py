@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -59,7 +60,7 @@ class Imitator:
 
     def _build_retargeting(self, legs: Legs) -> Retargeting:
         robot, s, maker = self.robot, self.settings, self._maker
-        gate = Gate(robot, legs, self._clearance, s.gate)
+        gate = self._gate = Gate(robot, legs, self._clearance, s.gate)
         stride = Stride(maker, landing_set(robot), s.offset, s.swing)
         planted = Planted(robot, legs, maker, stride, s.leg_weights, self._clearance, gate)
         ik = s.paper_ik or PaperIk()
@@ -156,15 +157,22 @@ class Imitator:
         )
 
     def _start(self, seen: Observation, targets: Array, footing: Footing) -> GivenUp:
-        """Frame 0: the double-support stand nearest to the person's posture, found without speed limits."""
+        """Frame 0: the double-support stand nearest to the person's posture, found without speed limits.
+
+        Where that is no safe stand, because the person is none, the robot's own.
+        """
         self._arms.reset()
-        standing = self._maker.stand(self.robot.postures["stand"].copy())
+        standing, held = self._maker.stand(self.robot.postures["stand"].copy()), GivenUp(0)
         q = self._arms.settle(standing, targets[HANDS], seen, self._clearance, SETTLE_STEPS)
         pose = self._retargeting.place(q, targets[FEET], footing)
+        if not self._gate.safe(pose):
+            soles, held = standing.soles_in_base, GivenUp.HOLD
+            calm = replace(footing, support="D", offset=0.5, between=soles[1] - soles[0], torso=np.eye(3), headings=(0.0, 0.0))
+            pose = self._retargeting.place(standing.q, soles - self._hips, calm)
         self._pose = pose
         self._time = 0.0
         self._stand_still()
-        return self._missed(pose, seen, targets, footing)
+        return held | self._missed(pose, seen, targets, footing)
 
     def _stand_still(self) -> None:
         """Hands and feet start again from where they are."""

@@ -148,7 +148,8 @@ class Prover:
         """The pose with flat soles at (2, 3) m, the left one turned, and the CoM between them; None without one."""
         rot = np.stack([yaw_matrix(yaw), np.eye(3)])
         left, right = self._maker.centres(soles, rot)[:, :2]
-        goal = LegGoal(pose.soles_in_base - self._legs.hip, left + offset * (right - left), np.ones(2))
+        com, free = left + offset * (right - left), np.full(3, np.inf)
+        goal = LegGoal(pose.soles_in_base - self._legs.hip, com, np.ones(2), -free, free, -free, free)
         self._clearance.look(pose)
         rows = self._clearance.leg_rows(pose, self._legs, 1)
         q, stance = pose.q.copy(), Stance(1, soles, rot, POSE, 0.0)

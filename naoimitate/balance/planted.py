@@ -167,7 +167,7 @@ class Planted:
             if closed:
                 stride.planted_pos[0], stride.planted_rot[0] = position, rotation
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
-        middle = heading(rotation) * 0.5
+        middle = heading(stride.planted_rot[0]) * 0.5
         R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
         self._turning, self._moving = np.zeros(3), np.zeros(3)
         stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
