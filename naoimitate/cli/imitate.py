@@ -58,6 +58,7 @@ def imitate(motion: str, **options: Any) -> None:
     """
     from naoimitate.cli.progress import progress
     from naoimitate.cli.simulated import simulated, write_pictures
+    from naoimitate.human.mirror import mirrored
     from naoimitate.robot import load_robot
     from naoimitate.run.file import save
     from naoimitate.run.recorded import imitate as run_recorded
@@ -65,6 +66,8 @@ def imitate(motion: str, **options: Any) -> None:
 
     robot = load_robot(options["robot"], options["robot_version"])
     person = read_motion(motion, **{key: options[key] for key in ("tpose_at", "fps", "unit", "up", "skeleton")})
+    if options["mirror"]:
+        person = mirrored(person)
     with progress(f"imitating {person.name}") as advance:
         run = run_recorded(person, robot, progress=advance, **_choices(options))
     if options["sim"]:
@@ -81,15 +84,15 @@ def _choices(options: dict[str, Any]) -> dict[str, Any]:
     """The arguments of ``run.recorded.imitate`` that the options stand for."""
     import hashlib
 
-    from naoimitate.calib.subject import load_subject
+    from naoimitate.calib.subject import calibrate, load_subject
+    from naoimitate.human.mirror import mirrored_frame
     from naoimitate.settings import Settings
 
-    settings = Settings(
-        retarget=options["retarget"], hand_orientation=options["hand_orientation"], mirror=options["mirror"]
-    )
+    settings = Settings(retarget=options["retarget"], hand_orientation=options["hand_orientation"])
     choices = {key: options[key] for key in ("speed", "rate", "sample", "start", "end", "seed")}
     if options["subject"] is not None:
-        choices["subject"] = load_subject(options["subject"])
+        subject = load_subject(options["subject"])
+        choices["subject"] = calibrate(mirrored_frame(subject.tpose)) if options["mirror"] else subject
         choices["subject_sha256"] = hashlib.sha256(options["subject"].read_bytes()).hexdigest()
     return {"settings": settings, **choices}
 
