@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from naoimitate.balance.offset import GRAVITY
 from naoimitate.core.geometry import polygon_centroid, rotation_vector
 from naoimitate.ik import SOLVED, bounded_step
 from naoimitate.robot.kernel import angular_jacobian, center_of_mass, com_jacobian, forward, point_jacobian
@@ -32,6 +33,8 @@ FREE = 1
 REACH = 2
 """The other sole makes for a pose in the world, around whatever is in its way; its height is a bound."""
 
+LEVER_STEP = 0.0005
+"""[m] by which a knee's lever must shrink in a frame where it is too long."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
 
@@ -44,6 +47,7 @@ class Legs(NamedTuple):
     hip: (2, 3) m in the base frame. outline: (2, K, 2) m, the soles' outlines, padded by repetition. centre: (2, 2) m.
     lower, upper: (J,) rad, with the knees kept off the stretched singularity. table_x, table_y: (B,) joints;
     table_rows: (B, R, 3), padded by repetition. rest: (J,) rad, the posture that decides what nothing else does.
+    knee: (2,) joints; knee_lever: (2,) m, how far the CoM's plumb line may pass from the knee that carries it all.
     """
 
     variable: npt.NDArray[np.int64]
@@ -59,6 +63,8 @@ class Legs(NamedTuple):
     table_y: npt.NDArray[np.int64]
     table_rows: Array
     rest: Array
+    knee: npt.NDArray[np.int64]
+    knee_lever: Array
 
 
 class LegWeights(NamedTuple):
@@ -99,6 +105,8 @@ class LegLimits:
     knee_min: float = 0.30
     """[rad]. Below 0.15 the torso loses one of its five free directions with both soles planted; from there to 0.3 a lift
     of millimetres still takes radians a second of the knee. It costs 1.7 mm of leg length."""
+    torque_share: float = 0.7
+    """Share of a knee's effort that the weight of the body may take: on one foot a deep bend is more than it holds."""
     range_reserve: float = 0.002
     """[rad] kept from every joint limit."""
 
@@ -114,8 +122,8 @@ def build_legs(robot: RobotModel, limits: LegLimits) -> Legs:
     for follower, lead in leader.items():
         variable[follower] = variable[lead]
     lower, upper = robot.lower + limits.range_reserve, robot.upper - limits.range_reserve
-    for side in ("l", "r"):
-        knee = robot.points[f"{side}_knee"].joint
+    knees = np.array([robot.points[f"{s}_knee"].joint for s in "lr"], dtype=np.int64)
+    for knee in knees:
         if upper[knee] >= -lower[knee]:
             lower[knee] = max(lower[knee], limits.knee_min)
         else:
@@ -136,6 +144,8 @@ def build_legs(robot: RobotModel, limits: LegLimits) -> Legs:
         np.array([t.y for t in tables], dtype=np.int64),
         np.array([_pad(t.rows, rows) for t in tables]).reshape(len(tables), rows, 3),
         robot.postures["stand"].copy(),
+        knees,
+        limits.torque_share * robot.effort[knees] / (robot.tree.mass.sum() * GRAVITY),
     )
 
 
@@ -171,6 +181,7 @@ class LegGoal(NamedTuple):
 
     turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes; move_low, move_high:
     (3,) m, of its origin's way, along them. The torso is the heaviest body: what jerks it tips the stance foot.
+    lever: (2,) m, how far the CoM's plumb line may pass from each knee.
     """
 
     feet: Array
@@ -180,6 +191,7 @@ class LegGoal(NamedTuple):
     turn_high: Array
     move_low: Array
     move_high: Array
+    lever: Array
 
 
 @njit(cache=True)
@@ -240,13 +252,14 @@ def solve_legs(
     R_wb, p_wb = np.empty((3, 3)), np.empty(3)
     J, x = np.empty((3, count)), np.empty(n)
     Js, Ws, Jo, Wo, Jc = np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty((3, n))
-    com, moved, slack = np.empty(3), np.zeros(n), np.zeros(2)
+    com, moved, slack, most = np.empty(3), np.zeros(n), np.zeros(2), np.zeros(2)
+    Jraw, Jk = np.empty((3, n)), np.empty((3, n))
     s, o = stance.side, 1 - stance.side
     equalities = 6 if stance.kind == POSE else 0
     corners = legs.outline.shape[1] if stance.kind != POSE else 0
     tables = legs.table_x.shape[0]
     start = np.array([q[j] for j in legs.joints])
-    C = np.zeros((equalities + 16 + 2 * n + 2 * tables + corners + rows.shape[0], n))
+    C = np.zeros((equalities + 20 + 2 * n + 2 * tables + corners + rows.shape[0], n))
     b = np.empty(C.shape[0])
     closure, com_error = 0.0, 0.0
     limit, damping, done = int(weights.iterations), weights.damping, 0
@@ -277,6 +290,7 @@ def solve_legs(
         H, g = np.zeros((n, n)), np.zeros(n)
         _add_task(Js, goal.feet[s] - (ps - legs.hip[s]), weights.foot * goal.foot_weight[s], H, g)
         _add_task(Jo, goal.feet[o] - (po - legs.hip[o]), weights.foot * goal.foot_weight[o], H, g)
+        Jraw[:] = Jc
         Jc -= Js
         add_cross(com - ps, Ws, Jc)
         Jb = -Js
@@ -310,6 +324,21 @@ def solve_legs(
                 slack[k] = max(weights.com_slack, abs(e_com[k]))
             C[row], b[row] = Jcw[k], e_com[k] - slack[k]
             C[row + 1], b[row + 1] = -Jcw[k], -e_com[k] - slack[k]
+            row += 2
+        for k in range(2):
+            at, arm = pos[legs.knee[k] + 1], rot[legs.knee[k] + 1] @ tree.axis[legs.knee[k]]
+            up = np.ascontiguousarray(R_wb[2])
+            point_jacobian(tree, pos, rot, legs.knee[k], at, J)
+            reduce_columns(J, legs, Jk)
+            lever = np.dot(arm, np.cross(com - at, up))
+            if iteration == 0:
+                most[k] = max(goal.lever[k], abs(lever) - LEVER_STEP)
+            side_way, turn_way = np.cross(up, arm), np.cross(arm, com - at)
+            for i in range(n):
+                tilt = np.cross(Ws[:, i], up)
+                C[row, i] = np.dot(side_way, Jraw[:, i] - Jk[:, i]) + np.dot(turn_way, tilt)
+            C[row + 1] = -C[row]
+            b[row], b[row + 1] = -most[k] - lever, lever - most[k]
             row += 2
         turned, went = Ws @ moved, Jb @ moved
         for k in range(3):

@@ -141,7 +141,7 @@ class PaperFeet:
             return SoleGoal(places, normals, False, self._between)
         centres, com = soles.centres, soles.com
         places = levelled(centres, com, offset, self._side) if again else shifted(centres, com, offset)
-        return SoleGoal(places, np.tile(up_vector(*places, com, offset), (2, 1)), True, self._between)
+        return SoleGoal(places, np.tile(up_vector(places[0], places[1], com, offset), (2, 1)), True, self._between)
 
     @property
     def _single(self) -> bool:
@@ -180,7 +180,7 @@ class PaperFeet:
         """The foot that is not shifted: the right one when o' < o, else the left one; in single support the stance."""
         if self.mode is not Mode.DOUBLE:
             return 0 if self.mode.stance == "L" else 1
-        return 1 if offset < offset_in_space(*soles.centres, soles.com) else 0
+        return 1 if offset < offset_in_space(soles.centres[0], soles.centres[1], soles.com) else 0
 
     def _hang_on(self, side: int, pose: Pose) -> None:
         """From now on the robot hangs on sole ``side``, flat where it is."""

@@ -113,7 +113,7 @@ class Planted:
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
         free = np.full(3, np.inf)
-        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free, -free, free)
+        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free, -free, free, self._levers(offset))
         calm = goal if reach.dt == 0.0 else self._calmed(goal, reach.dt)
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
@@ -136,6 +136,13 @@ class Planted:
             if done > 0 and (plan.kind != POSE or closure < CLOSED):
                 return iterations, True
         return iterations, False
+
+    def _levers(self, offset: float) -> Array:
+        """How far the plumb line may pass from each knee, (2,) m: less the more of the weight the leg carries."""
+        share = np.array([1.0 - offset, offset])
+        if self._stride.swinging:
+            share = np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
+        return np.asarray(self._legs.knee_lever / np.maximum(share, 1e-3))
 
     def _calmed(self, goal: LegGoal, dt: float) -> LegGoal:
         """The goal with the torso's bounds of speed and acceleration for a frame of dt s."""

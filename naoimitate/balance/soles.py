@@ -2,8 +2,8 @@
 
 Each foot is a problem of 5 degrees of freedom, a place and the sole's normal. One row more, the angle between the
 headings of the feet, settles what a joint is for that the legs share: without it bent hips would turn the toes against
-each other. The iteration runs until the published tolerance is met. It knows the coupling tables as limits of the present moment,
-so that Chang and Dubey's weights keep it from pushing against them.
+each other. The iteration runs until the published tolerance is met. It knows the coupling tables as limits of the
+present moment, so that Chang and Dubey's weights keep it from pushing against them.
 """
 
 from __future__ import annotations
@@ -137,12 +137,12 @@ def _errors(
         e[place] = goal.places[k] - centre
         A[turn] = W[k]
         e[turn] = np.cross(rot[row][:, 2], goal.normals[k])
-        arrived = arrived and np.linalg.norm(e[place]) < near and np.linalg.norm(e[turn]) < angle
+        arrived = bool(arrived and np.linalg.norm(e[place]) < near and np.linalg.norm(e[turn]) < angle)
     if goal.down:
         up = np.ascontiguousarray(goal.normals[0])
         A[12] = up @ (W[0] - W[1])
         e[12] = goal.between - angle_between(legs, rot, up)
-    return arrived and abs(e[12]) < angle
+    return bool(arrived and abs(e[12]) < angle)
 
 
 @njit(cache=True)
