@@ -61,6 +61,10 @@ class ContactRule:
         return np.array([1.0, 1.0, self.tip_speed])
 
 
+MEASURED = ContactRule(tip_touch=0.030, tip_speed=1.0)
+"""The rule for feet whose tips the source measures or models."""
+
+
 @dataclass(frozen=True)
 class Contacts:
     """What was found in a whole motion.
@@ -83,11 +87,19 @@ def foot_points(landmarks: Array, tip: float) -> Array:
 
 
 def find_contacts(
-    time: Array, landmarks: Array, given: Mask | None = None, rule: ContactRule | None = None
+    time: Array,
+    landmarks: Array,
+    given: Mask | None = None,
+    feet: Array | None = None,
+    rule: ContactRule | None = None,
 ) -> Contacts:
-    """Find floor and planted feet of a motion, (T,) s, (T, 19, 3) m; ``given`` (T, 2) bool: the source's contacts."""
-    rule = rule or ContactRule()
-    points = smooth(time, foot_points(landmarks, rule.tip))
+    """Find the floor and the planted feet of a motion, (T,) s, (T, 19, 3) m.
+
+    given: (T, 2) bool, the source's own contacts. feet: (T, 2, 3, 3) m, ankle, ball and tip of the toes as the source
+    knows them, NaN where it does not; without it they are taken from the landmarks, and the tips are guessed.
+    """
+    rule = rule or (ContactRule() if feet is None else MEASURED)
+    points = smooth(time, foot_points(landmarks, rule.tip) if feet is None else feet)
     speed = speeds(time, points)
     floor = _floor(points, speed, landmarks)
     heights = floor.above(points)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from naoimitate.core.frames import LANDMARK, Array, Motion
 from naoimitate.human.body import ANKLE_HEIGHT_BY_STATURE, LEG_BY_STATURE
-from naoimitate.human.contact import MOVING, ContactRule, Contacts, find_contacts
+from naoimitate.human.contact import MOVING, Contacts, find_contacts
 from naoimitate.human.floor import Floor
 from naoimitate.human.live_support import SupportEstimator
 
@@ -19,23 +19,24 @@ _LEG = (("hip", "knee"), ("knee", "ankle"))
 __all__ = ["SupportEstimator", "annotate", "last_mode", "raw_support"]
 
 
-def annotate(motion: Motion, rule: ContactRule | None = None) -> Motion:
+def annotate(motion: Motion, feet: Array | None = None) -> Motion:
     """The motion with its floor brought to z = 0, level, and its support known: ``D``, ``L``, ``R`` or ``F`` a frame.
 
-    Contacts that the source gives are used. While feet slide or pivot the last mode is kept. A motion whose support is
-    known already is returned as it is. The T-pose is not moved: it is a posture, not a place.
+    feet: (T, 2, 3, 3) m, as in ``find_contacts``. Contacts that the source gives are used. While feet slide or pivot
+    the last mode is kept. A motion whose support is known already is returned as it is. The T-pose is not moved: it is
+    a posture, not a place.
     """
     if motion.support is not None:
         return motion
     motion = replace(motion, landmarks=np.where(np.isfinite(motion.landmarks), motion.landmarks, np.nan))
-    found = raw_support(motion, rule)
+    found = raw_support(motion, feet)
     level = _on_level_floor(motion, found.floor)
     return replace(level, support=last_mode(found.classes), contacts=found.planted)
 
 
-def raw_support(motion: Motion, rule: ContactRule | None = None) -> Contacts:
+def raw_support(motion: Motion, feet: Array | None = None) -> Contacts:
     """Planted feet, floor, and the raw class of every frame of a motion, ``M`` (feet moving) included."""
-    return find_contacts(motion.time, motion.landmarks, motion.contacts, rule)
+    return find_contacts(motion.time, motion.landmarks, motion.contacts, feet)
 
 
 def last_mode(classes: npt.NDArray[np.str_]) -> npt.NDArray[np.str_]:
@@ -61,6 +62,7 @@ def _on_level_floor(motion: Motion, floor: Floor) -> Motion:
             return None
         return np.asarray(turn.apply(points.reshape(-1, 3)).reshape(points.shape) - [0.0, 0.0, height])
 
+    degrees = np.degrees(turn.magnitude())
     landmarks = moved(motion.landmarks)
     assert landmarks is not None
     return replace(
@@ -68,7 +70,7 @@ def _on_level_floor(motion: Motion, floor: Floor) -> Motion:
         landmarks=landmarks,
         com=moved(motion.com),
         orientations=_turned(turn, motion.orientations),
-        notes=(*motion.notes, f"the floor was {height:+.3f} m high, tilted by {np.degrees(turn.magnitude()):.1f} deg"),
+        notes=(*motion.notes, f"The floor was {height:+.3f} m high and tilted by {degrees:.1f} deg; it is z = 0 now."),
     )
 
 
