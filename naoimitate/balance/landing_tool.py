@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance, ClearanceSettings
-from naoimitate.balance.legs import POSE, LegGoal, LegLimits, LegWeights, Stance, build_legs, solve_legs
+from naoimitate.balance.legs import POSE, LegLimits, LegWeights, Stance, build_legs, free_goal, solve_legs
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.robot.model import RobotModel
@@ -148,8 +148,8 @@ class Prover:
         """The pose with flat soles at (2, 3) m, the left one turned, and the CoM between them; None without one."""
         rot = np.stack([yaw_matrix(yaw), np.eye(3)])
         left, right = self._maker.centres(soles, rot)[:, :2]
-        com, free = left + offset * (right - left), np.full(3, np.inf)
-        goal = LegGoal(pose.soles_in_base - self._legs.hip, com, np.ones(2), -free, free, -free, free)
+        feet, shares = pose.soles_in_base - self._legs.hip, np.array([1.0 - offset, offset])
+        goal = free_goal(self._legs, feet, left + offset * (right - left), np.ones(2), shares)
         self._clearance.look(pose)
         rows = self._clearance.leg_rows(pose, self._legs, 1)
         q, stance = pose.q.copy(), Stance(1, soles, rot, POSE, 0.0)

@@ -194,6 +194,12 @@ class LegGoal(NamedTuple):
     lever: Array
 
 
+def free_goal(legs: Legs, feet: Array, com: Array, foot_weight: Array, share: Array) -> LegGoal:
+    """A goal whose torso may move as it likes; share: (2,) of the weight on each leg, which bounds its knee's lever."""
+    free = np.full(3, np.inf)
+    return LegGoal(feet, com, foot_weight, -free, free, -free, free, legs.knee_lever / np.maximum(share, 1e-3))
+
+
 @njit(cache=True)
 def base_pose(tree: Tree, legs: Legs, stance: Stance, pos: Array, rot: Array, R_wb: Array, p_wb: Array) -> None:
     """World pose of the base from the stance sole; pos, rot from ``forward``. Writes R_wb (3, 3) and p_wb (3,)."""

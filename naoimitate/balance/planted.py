@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance
-from naoimitate.balance.legs import FREE, POSE, LegGoal, Legs, LegWeights, Stance, solve_legs
+from naoimitate.balance.legs import FREE, POSE, LegGoal, Legs, LegWeights, Stance, free_goal, solve_legs
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
 from naoimitate.balance.stride import Plan, Stride
@@ -112,8 +112,7 @@ class Planted:
             foot_weight[:] = (LANDING_WEIGHT, LANDING_WEIGHT) if stride.mode.landing else (1.0, 1.0)
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
-        free = np.full(3, np.inf)
-        goal = LegGoal(feet, stride.com_goal(offset), foot_weight, -free, free, -free, free, self._levers(offset))
+        goal = free_goal(self._legs, feet, stride.com_goal(offset), foot_weight, self._shares(offset))
         calm = goal if reach.dt == 0.0 else self._calmed(goal, reach.dt)
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
@@ -137,12 +136,11 @@ class Planted:
                 return iterations, True
         return iterations, False
 
-    def _levers(self, offset: float) -> Array:
-        """How far the plumb line may pass from each knee, (2,) m: less the more of the weight the leg carries."""
-        share = np.array([1.0 - offset, offset])
+    def _shares(self, offset: float) -> Array:
+        """How much of the weight the left and the right leg carry, (2,)."""
         if self._stride.swinging:
-            share = np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
-        return np.asarray(self._legs.knee_lever / np.maximum(share, 1e-3))
+            return np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
+        return np.array([1.0 - offset, offset])
 
     def _calmed(self, goal: LegGoal, dt: float) -> LegGoal:
         """The goal with the torso's bounds of speed and acceleration for a frame of dt s."""
