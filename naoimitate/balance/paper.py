@@ -38,6 +38,8 @@ SWING_CLEARANCE = 0.008
 """[m] of a swing sole's lowest point above the floor: 5 mm, and what the tolerances of the solve take from it."""
 FEET_APART = 0.010
 """[m] kept between the soles' inner edges: what shifting one of them sideways may take, and 5 mm."""
+SPREAD = 0.05
+"""[m] more that is kept between them where nothing of the mapped feet is asked for: so they come off each other."""
 SHARE_SPEED = 1.0
 """[1/s] at which the share of the mapped feet in the request grows, or shrinks while the legs cannot reach it."""
 
@@ -138,10 +140,11 @@ class PaperFeet:
         if self._single:
             outline = self._legs.outline[1 - self._side] - self._legs.centre[1 - self._side]
             places, normals = swung(*soles, self._side, outline, SWING_CLEARANCE)
-            return SoleGoal(places, normals, False, self._between)
+            return SoleGoal(places, normals, normals[self._side], self._between)
         centres, com = soles.centres, soles.com
         places = levelled(centres, com, offset, self._side) if again else shifted(centres, com, offset)
-        return SoleGoal(places, np.tile(up_vector(places[0], places[1], com, offset), (2, 1)), True, self._between)
+        up = up_vector(places[0], places[1], com, offset)
+        return SoleGoal(places, np.array([up, up]), up, self._between)
 
     @property
     def _single(self) -> bool:
@@ -169,7 +172,7 @@ class PaperFeet:
             solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
         self._mapped = q[self._leg_joints]
         soles = soles_at(self._tree, self._legs, q)
-        return soles._replace(centres=parted(soles.centres, self._apart))
+        return soles._replace(centres=parted(soles.centres, self._apart + (1.0 - self._share) * SPREAD))
 
     def _inner_edge(self, foot: int, yaw: float) -> float:
         """y of the sole's inner edge from its centre, m, when the sole is turned by ``yaw`` rad."""

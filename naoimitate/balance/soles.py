@@ -39,13 +39,13 @@ class Soles(NamedTuple):
 class SoleGoal(NamedTuple):
     """What is asked of both soles, in the torso frame.
 
-    places: (2, 3) m of their centres. normals: (2, 3). between: rad, the left sole's heading from the right one's,
-    asked for where both soles are ``down``.
+    places: (2, 3) m of their centres. normals: (2, 3). up: (3,), off the floor. between: rad about ``up``, the left
+    sole's heading from the right one's.
     """
 
     places: Array
     normals: Array
-    down: bool
+    up: Array
     between: float
 
 
@@ -138,18 +138,19 @@ def _errors(
         A[turn] = W[k]
         e[turn] = np.cross(rot[row][:, 2], goal.normals[k])
         arrived = bool(arrived and np.linalg.norm(e[place]) < near and np.linalg.norm(e[turn]) < angle)
-    if goal.down:
-        up = np.ascontiguousarray(goal.normals[0])
-        A[12] = up @ (W[0] - W[1])
-        e[12] = goal.between - angle_between(legs, rot, up)
+    level, turn = headings(legs, rot, goal.up)
+    A[12] = level * (goal.up @ (W[0] - W[1]))
+    e[12] = level * (goal.between - turn)
     return bool(arrived and abs(e[12]) < angle)
 
 
 @njit(cache=True)
-def angle_between(legs: Legs, rot: Array, normal: Array) -> float:
-    """The left sole's heading about ``normal`` (3,), from the right sole's, rad."""
+def headings(legs: Legs, rot: Array, up: Array) -> tuple[float, float]:
+    """How much of both headings lies across ``up`` (3,), 0 to 1, and the left sole's from the right one's, rad."""
     left, right = rot[legs.sole_joint[0] + 1][:, 0], rot[legs.sole_joint[1] + 1][:, 0]
-    return float(np.arctan2((np.cross(right, left) * normal).sum(), (right * left).sum()))
+    left, right = left - (left * up).sum() * up, right - (right * up).sum() * up
+    sine, cosine = (np.cross(right, left) * up).sum(), (right * left).sum()
+    return np.hypot(sine, cosine), np.arctan2(sine, cosine)
 
 
 @njit(cache=True)

@@ -15,9 +15,12 @@ from naoimitate.balance.retarget import Footing
 from naoimitate.balance.swing import Phase, Swing, SwingSettings
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
+from naoimitate.fsm.support import OFFSET_REACHED
 
 Array = npt.NDArray[np.float64]
 
+LIFT_STILL = 0.1
+"""[s] for which the offset has been where it belongs before a foot is lifted: the servos have unloaded it by then."""
 _KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
 
 
@@ -52,7 +55,7 @@ class Stride:
         self._fsm = SupportFsm()
         self.planted_pos, self.planted_rot = planted_pos.copy(), planted_rot.copy()
         self.offset, self._offset_speed = offset, 0.0
-        self.side = 1
+        self.side, self._still = 1, 0.0
         self._swing: Swing | None = None
         self._good = self._can_stand_on_both()
 
@@ -75,13 +78,15 @@ class Stride:
             descending=self._swing is not None and self._swing.phase is Phase.DESCEND,
             stance_ok=(True, True) if self.swinging else self._stance_ok(),
             ahead=footing.ahead,
-            may_lift=footing.may_lift,
+            may_lift=footing.may_lift and self._still > LIFT_STILL,
         )
         if self._fsm.step(given) is not before:
             self._changed(before)
         target = offset_target(self.mode, given, footing.offset)
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         limit = self._law.acceleration(float(np.hypot(*(right - left)[:2])), float(pose.com[2]))
+        there = abs(self.offset - target) < OFFSET_REACHED
+        self._still = self._still + dt if there and not self.swinging else 0.0
         offset, speed = advance(self.offset, self._offset_speed, target, dt, self._law, limit)
         if self._swing is None:
             self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)

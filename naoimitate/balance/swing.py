@@ -62,6 +62,8 @@ class SwingSettings:
     """[s] of approach after which a foot that does not arrive may come down near its place."""
     yielding: float = 0.01
     """[m/s] by which the distance that is near enough grows from then on."""
+    hover: float = 0.12
+    """[s] over the landing place before the foot goes down: what sways comes to rest."""
     settled: float = 0.02
     """[m/s] below which a foot over its landing place goes down."""
     arrived: float = 0.001
@@ -79,7 +81,7 @@ class Swing:
         self.settings = settings
         self.min_height = 0.0
         self._velocity, self._turning = np.zeros(3), 0.0
-        self._waited = 0.0
+        self._waited, self._hovered = 0.0, 0.0
         self._before = position.copy()
         self._start = position.copy()
         self._rotation = rotation.copy()
@@ -125,7 +127,9 @@ class Swing:
         self._waited += dt
         near = self.settings.arrived + self.settings.yielding * max(self._waited - self.settings.patience, 0.0)
         settled = np.linalg.norm(moved) < self.settings.settled * dt or self._waited > self.settings.patience
-        if np.linalg.norm(way) < near and 0.1 * angle < near and settled:
+        arrived = np.linalg.norm(way) < near and 0.1 * angle < near and settled
+        self._hovered = self._hovered + dt if arrived else 0.0
+        if self._hovered > self.settings.hover:
             self.phase = Phase.DESCEND
             self._start = position.copy()
             self._velocity[:] = 0.0

@@ -127,7 +127,7 @@ class Motion:
     @property
     def rate(self) -> float:
         """Mean frame rate, Hz (0 for a single frame)."""
-        return (len(self) - 1) / self.duration if len(self) > 1 else 0.0
+        return (len(self) - 1) / float(self.time[-1] - self.time[0]) if len(self) > 1 else 0.0
 
     def at(self, time: float) -> HumanFrame:
         """The person at any time (s), interpolated; before the first and after the last frame they stand still.
