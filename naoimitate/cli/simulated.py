@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,9 +16,11 @@ if TYPE_CHECKING:
 
 def simulated(run: Run, robot: RobotModel) -> Run:
     """The run with what the simulated robot made of it."""
+    from naoimitate.cli.progress import progress
     from naoimitate.sim.simulate import simulate
 
-    result = simulate(robot, run.time, run.q, run.base_pos, run.base_quat, run.support)
+    with progress("simulating") as advance:
+        result = simulate(robot, run.time, run.q, run.base_pos, run.base_quat, run.support, progress=advance)
     return dataclasses.replace(
         run,
         sim_base_pos=result.base_pos,
@@ -35,19 +37,21 @@ def write_pictures(
 
     Returns what was written. Without off-screen OpenGL nothing is, and a message on standard error says why.
     """
+    from naoimitate.cli.progress import progress
     from naoimitate.core.errors import RenderingUnavailable
     from naoimitate.sim.render import render_strip, render_video
 
     q, base_pos, base_quat = run.q, run.base_pos, run.base_quat
     if run.sim_q is not None and run.sim_base_pos is not None and run.sim_base_quat is not None:
         q, base_pos, base_quat = run.sim_q, run.sim_base_pos, run.sim_base_quat
+    seen: dict[str, Any] = {"human": motion, "human_time": run.human_time}
     written = []
-    for render, path in ((render_strip, strip), (render_video, video)):
-        if path is not None:
-            try:
-                render(robot, run.time, q, base_pos, base_quat, path, human=motion, human_time=run.human_time)
-            except RenderingUnavailable as error:
-                click.echo(f"no pictures: {error}", err=True)
-                break
-            written.append(path)
+    try:
+        if strip is not None:
+            written.append(render_strip(robot, run.time, q, base_pos, base_quat, strip, **seen))
+        if video is not None:
+            with progress("drawing the video") as advance:
+                written.append(render_video(robot, run.time, q, base_pos, base_quat, video, **seen, progress=advance))
+    except RenderingUnavailable as error:
+        click.echo(f"no pictures: {error}", err=True)
     return written

@@ -16,7 +16,7 @@ FIGURES_DRAWN = 8
 """Stick figures in a picture, at equal steps of time."""
 VIEW = np.radians(35.0)
 """Direction from which a stick figure is seen, from its front towards its left, rad."""
-GAP = 1.1
+GAP = 1.45
 """Between stick figures, m."""
 BONES = (
     ("pelvis", "chest", "head"),
@@ -30,8 +30,9 @@ BONES = (
 
 def describe_motion(motion: Motion) -> list[str]:
     """What is known about a motion, a line each."""
+    first, last = motion.time[0], motion.time[-1]
     lines = [
-        f"{motion.name}: {len(motion)} frames, {motion.duration:.2f} s, {motion.rate:.1f} Hz",
+        f"{motion.name}: {len(motion)} frames from {first:.2f} to {last:.2f} s, {_rate(motion):.1f} Hz",
         *(f"  {note}" for note in motion.notes),
         f"  T-pose: {motion.tpose_note or 'none'}",
         f"  person: {_person(motion)}",
@@ -44,8 +45,8 @@ def describe_motion(motion: Motion) -> list[str]:
 
 def picture_motion(motion: Motion) -> Figure:
     """Stick figures, support modes and foot heights over time."""
-    figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-    people, modes, feet = figure.subplots(3, 1, height_ratios=[5, 0.5, 2])
+    figure = Figure(figsize=(11.0, 4.8), layout="constrained")
+    people, modes, feet = figure.subplots(3, 1, height_ratios=[4, 0.5, 2])
     _draw_people(people, motion)
     _draw_modes(modes, motion)
     for side, colour in (("l", LEFT), ("r", RIGHT)):
@@ -97,6 +98,10 @@ def _draw_modes(axes: Axes, motion: Motion) -> None:
 
 def _span(motion: Motion) -> tuple[float, float]:
     return float(motion.time[0]), float(max(motion.time[-1], motion.time[0] + 1e-3))
+
+
+def _rate(motion: Motion) -> float:
+    return (len(motion) - 1) / float(motion.time[-1] - motion.time[0]) if len(motion) > 1 else 0.0
 
 
 def _person(motion: Motion) -> str:
