@@ -6,8 +6,7 @@ import math
 from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-
-import numpy as np
+from typing import Any
 
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Motion
@@ -16,6 +15,8 @@ __all__ = ["load_motion"]
 
 BUILTIN = "builtin:"
 """Beginning of the names of built-in motions."""
+FRAMEWISE = ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")
+"""What a motion has one value of for each frame, beside the time."""
 
 
 def load_motion(
@@ -65,10 +66,8 @@ def _cut(motion: Motion, start: float | None, end: float | None) -> Motion:
     first, last = (0.0 if start is None else start), (math.inf if end is None else end)
     inside = (motion.time >= first - 1e-9) & (motion.time <= last + 1e-9)
     if math.isnan(first) or math.isnan(last) or not inside.any():
-        raise MotionFormatError(
-            f"no frame lies between {first:g} and {last:g} s: the motion goes from {motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
-        )
-    parts = ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")
-    arrays = {part: getattr(motion, part) for part in parts}
-    kept = {part: None if values is None else np.asarray(values[inside]) for part, values in arrays.items()}
+        whole = f"{motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
+        raise MotionFormatError(f"no frame lies between {first:g} and {last:g} s: the motion goes from {whole}")
+    arrays = {name: getattr(motion, name) for name in FRAMEWISE}
+    kept: dict[str, Any] = {name: None if values is None else values[inside] for name, values in arrays.items()}
     return replace(motion, time=motion.time[inside], **kept)

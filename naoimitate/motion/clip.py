@@ -108,7 +108,7 @@ def forward(skeleton: Skeleton, root: Array, local: Array) -> tuple[Array, Array
     root: (T, 3) position of the root. local: (T, J, 3, 3) rotation of every node against its parent (identity for
     ends). Returns positions (T, J, 3) and rotations (T, J, 3, 3) in the world.
     """
-    positions, rotations = np.empty(local.shape[:2] + (3,)), np.empty_like(local)
+    positions, rotations = np.empty((*local.shape[:2], 3)), np.empty_like(local)
     with np.errstate(over="ignore", invalid="ignore"):
         for i, parent in enumerate(skeleton.parents):
             if parent < 0:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,16 +30,39 @@ FAMILIES: tuple[tuple[str, frozenset[str]], ...] = (
 )
 """Name of a family, and joints that only it has together."""
 
-_DROPPED = {
-    CGSPEED_MB: ("Spine1", ("LeftShoulder", "RightShoulder", "Neck"), (("LeftHand", ("LeftFingerBase", "LThumb")), ("RightHand", ("RightFingerBase", "RThumb")))),
-    CGSPEED_MAX: ("Chest2", ("LeftCollar", "RightCollar", "lowerneck"), (("LeftWrist", ("lhand", "LThumb")), ("RightWrist", ("rhand", "RThumb")))),
-}  # fmt: skip
-"""What cgspeed's conversions dropped of CMU's skeletons: the joint whose bone (thorax) has no length, the joints at its
-end; the joints whose bones (wrists) have none, and those at their ends. Measured against the AMC file of trial 02_02."""
+
+@dataclass(frozen=True)
+class DroppedBone:
+    """A bone without length: it starts at ``joint``, where the joints ``beyond`` now are.
+
+    share: its length by that of the bone that leads to ``joint``; its direction is nearly the same.
+    """
+
+    joint: str
+    beyond: tuple[str, ...]
+    share: float
+
+
 THORAX = 1.0
-"""Thorax / upper back in CMU's skeletons: 1.001 (02), 1.005 (07), about the same direction."""
+"""Thorax / upper back in CMU's skeletons: 1.001 (02), 1.005 (07)."""
 WRIST = 0.5
 """CMU's wrist bone / radius: exactly one half in every skeleton."""
+DROPPED = {
+    CGSPEED_MB: (
+        DroppedBone("Spine1", ("LeftShoulder", "RightShoulder", "Neck"), THORAX),
+        DroppedBone("LeftHand", ("LeftFingerBase", "LThumb"), WRIST),
+        DroppedBone("RightHand", ("RightFingerBase", "RThumb"), WRIST),
+    ),
+    CGSPEED_MAX: (
+        DroppedBone("Chest2", ("LeftCollar", "RightCollar", "lowerneck"), THORAX),
+        DroppedBone("LeftWrist", ("lhand", "LThumb"), WRIST),
+        DroppedBone("RightWrist", ("rhand", "RThumb"), WRIST),
+    ),
+}
+"""Bones of CMU's skeletons that cgspeed's conversions lack, found by comparing trial 02_02 with its AMC file."""
+
+BOWED_HEAD = (CGSPEED_MAX, CGSPEED_MB)
+"""Families in whose added T-pose the head is bowed, by 16 deg (neck -16, 21 and 11); the rest pose looks ahead."""
 
 
 def family_of(skeleton: Skeleton) -> str:
@@ -51,33 +74,28 @@ def family_of(skeleton: Skeleton) -> str:
 def restored(clip: Clip) -> Clip:
     """The clip with the thorax and wrist bones that cgspeed's conversions of CMU's recordings lack.
 
-    Without them shoulders, arms and head are about 0.12 m too low. Unchanged when the bones are there.
+    Without them shoulders, arms and head are about 0.12 m too low. Unchanged where the bones are there.
     """
-    family = family_of(clip.skeleton)
-    if family not in _DROPPED:
-        return clip
-    thorax, above, wrists = _DROPPED[family]
     names = clip.skeleton.names
     lengths = np.linalg.norm(clip.skeleton.offsets, axis=1)
-    bones = [(thorax, above, THORAX)] + [(wrist, beyond, WRIST) for wrist, beyond in wrists]
-    for joint, moved, share in bones:
-        if joint not in names:
-            continue
-        node = names.index(joint)
-        nodes = [names.index(name) for name in moved if name in names]
-        if any(lengths[i] > 0.02 * lengths[node] for i in nodes):
-            continue
-        clip = _lengthened(clip, node, nodes, share)
-    note = "The thorax bone that this conversion drops was put back: shoulders, arms and head are higher by its length."
-    return clip if clip.positions is None else replace(clip, notes=(*clip.notes, note))
+    done = False
+    for bone in DROPPED.get(family_of(clip.skeleton), ()):
+        node = names.index(bone.joint) if bone.joint in names else 0
+        beyond = [names.index(name) for name in bone.beyond if name in names]
+        if node and beyond and lengths[beyond].max() < 0.02 * lengths[node]:
+            clip, done = _lengthened(clip, node, beyond, bone.share), True
+    if not done:
+        return clip
+    note = "The thorax and wrist bones that this conversion drops were put back: shoulders, arms and head are higher."
+    return replace(clip, notes=(*clip.notes, note))
 
 
-def _lengthened(clip: Clip, node: int, moved: list[int], share: float) -> Clip:
-    """A bone at ``node``, as long as ``share`` of the bone that leads there, between it and the joints ``moved``."""
+def _lengthened(clip: Clip, node: int, beyond: list[int], share: float) -> Clip:
+    """The clip with a bone at ``node``, as the one that leads there times ``share``, before the joints ``beyond``."""
     bone = share * clip.skeleton.offsets[node]
     offsets, positions = clip.skeleton.offsets.copy(), clip.positions.copy()
     shift = clip.rotations[:, node] @ bone
-    for i in moved:
+    for i in beyond:
         offsets[i] += bone
         positions[:, clip.skeleton.below(i)] += shift[:, None]
     return replace(clip, skeleton=replace(clip.skeleton, offsets=offsets), positions=positions)

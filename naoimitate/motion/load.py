@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from naoimitate.core.errors import MotionFormatError
-from naoimitate.core.frames import LANDMARK, Array, HumanFrame, Motion
+from naoimitate.core.frames import LANDMARK, SEGMENT, Array, HumanFrame, Motion
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.support import annotate
 from naoimitate.motion.clip import Clip
-from naoimitate.motion.families import restored
+from naoimitate.motion.families import BOWED_HEAD, restored
 from naoimitate.motion.person import Person, landmarks_of, orientations_of, person, placed, reference_frame
 from naoimitate.motion.rate import true_rate
 from naoimitate.motion.readers import read
@@ -104,7 +104,7 @@ def load_file(path: Path, options: Options) -> Motion:
 def _scene(clip: Clip, options: Options) -> _Scene:
     """Recognise the person, and bring everything to metres and z up."""
     clip = restored(clip)
-    anatomy = recognise(clip.skeleton)
+    anatomy = recognise(clip)
     motion, rest = track(clip, anatomy), track_of(clip, anatomy, clip.rest)
     up, up_note = up_axis(motion, rest, clip.up, options.up)
     unit, unit_note = metres_per_unit(leg_length(clip.skeleton, anatomy.nodes), clip.unit, options.unit)
@@ -139,17 +139,21 @@ def _calibrate(scene: _Scene, time: Array, rate: float, tpose_at: float | str) -
     if tpose_at == "auto":
         if scene.tpose is not None:
             return _Calibration(
-                from_frame(scene.tpose, 0), scene.tpose, None, "The T-pose is the file's own calibration posture."
+                from_frame(scene.tpose, 0, scene.rest),
+                scene.tpose,
+                None,
+                "The T-pose is the file's own calibration posture.",
             )
         if scene.added and bool(is_tpose(scene.motion.landmarks[:1])[0]):
-            return _Calibration(
-                from_frame(scene.motion, 0), scene.motion[:1], None, "The T-pose is the added first frame."
-            )
+            added = _head_raised(scene.motion[:1]) if scene.family in BOWED_HEAD else scene.motion[:1]
+            return _Calibration(from_frame(added, 0, scene.rest), added, None, "The T-pose is the added first frame.")
         held = held_tpose(scene.motion.landmarks[scene.added :], rate)
         if held is not None:
             frame = scene.added + held
             note = f"The T-pose is the one held at {time[frame]:.2f} s."
-            return _Calibration(from_frame(scene.motion, frame), scene.motion[frame : frame + 1], frame, note)
+            return _Calibration(
+                from_frame(scene.motion, frame, scene.rest), scene.motion[frame : frame + 1], frame, note
+            )
     reference = from_rest(scene.rest)
     if reference is not None:
         return _Calibration(
@@ -157,7 +161,14 @@ def _calibrate(scene: _Scene, time: Array, rate: float, tpose_at: float | str) -
         )
     frame = scene.added + best_standing_frame(scene.motion.landmarks[scene.added :])
     note = f"No T-pose in the file: made from its segment lengths and its most upright frame, at {time[frame]:.2f} s."
-    return _Calibration(from_frame(scene.motion, frame), None, None, note)
+    return _Calibration(from_frame(scene.motion, frame, scene.rest), None, None, note)
+
+
+def _head_raised(posture: Track) -> Track:
+    """The posture with the head turned like the chest, as in the rest pose."""
+    turns = posture.turns.copy()
+    turns[:, SEGMENT["head"]] = turns[:, SEGMENT["chest"]]
+    return Track(posture.landmarks, turns)
 
 
 def _asked(scene: _Scene, time: Array, moment: float) -> _Calibration:
@@ -169,7 +180,9 @@ def _asked(scene: _Scene, time: Array, moment: float) -> _Calibration:
         raise MotionFormatError(f"the person is missing at {moment:g} s: choose another moment with --tpose-at")
     note = f"The T-pose is the frame at {time[frame]:.2f} s as asked"
     note += "." if bool(is_tpose(posture.landmarks)[0]) else ", though the posture there is none."
-    return _Calibration(from_frame(scene.motion, frame), posture, frame if frame >= scene.added else None, note)
+    return _Calibration(
+        from_frame(scene.motion, frame, scene.rest), posture, frame if frame >= scene.added else None, note
+    )
 
 
 def _world(scene: _Scene, calibration: _Calibration) -> tuple[Array, Array]:

@@ -29,7 +29,13 @@ PARENTS = {
     **{f"{s}Toe": f"{s}Foot" for s in ("Right", "Left")},
 }  # fmt: skip
 """Segment above each segment; the file's own order of segments is kept otherwise."""
-ENDS = {"Head": "pTopOfHead", **{f"{s}{n}": f"p{s}{p}" for s in ("Right", "Left") for n, p in (("Hand", "TopOfHand"), ("Toe", "Toe"))}}  # fmt: skip
+ENDS = {
+    "Head": "pTopOfHead",
+    "RightHand": "pRightTopOfHand",
+    "LeftHand": "pLeftTopOfHand",
+    "RightToe": "pRightToe",
+    "LeftToe": "pLeftToe",
+}
 """Bony points that end the last segments."""
 
 
@@ -150,7 +156,7 @@ def _pose(frames: list[dict[str, list[float]]], columns: list[int]) -> tuple[Arr
     last = max(columns) + 1
     positions = np.array([f["position"][: 3 * last] for f in frames]).reshape(len(frames), last, 3)[:, columns]
     quats = np.array([f["orientation"][: 4 * last] for f in frames]).reshape(len(frames), last, 4)[:, columns]
-    rotations = np.full(quats.shape[:2] + (3, 3), np.nan)
+    rotations = np.full((*quats.shape[:2], 3, 3), np.nan)
     size = np.linalg.norm(quats, axis=-1)
     good = np.isfinite(size) & (size > 1e-6)
     if good.any():

@@ -73,15 +73,14 @@ def landmarks_of(who: Person, track: Track) -> Array:
 
 
 def orientations_of(who: Person, track: Track) -> Array:
-    """Orientations (T, 7, 4) (w, x, y, z) of the segments, identity in the T-pose; continuous in sign, NaN where unknown."""
+    """Orientations (T, 7, 4) (w, x, y, z) of the segments, identity in the T-pose; signs go on, NaN where unknown."""
     turns = track.turns @ np.swapaxes(who.reference.turns, -1, -2)
-    out = np.full(turns.shape[:2] + (4,), np.nan)
+    out = np.full((*turns.shape[:2], 4), np.nan)
     known = np.isfinite(turns).all(axis=(-1, -2))
     if known.any():
         out[known] = np.roll(Rotation.from_matrix(turns[known]).as_quat(canonical=True), 1, axis=-1)
-    for frame in range(1, len(out)):
-        flip = np.sum(out[frame] * out[frame - 1], axis=-1) < 0.0
-        out[frame, flip] *= -1.0
+    flips = np.where(np.sum(out[1:] * out[:-1], axis=-1) < 0.0, -1.0, 1.0)
+    out[1:] *= np.cumprod(flips, axis=0)[..., None]
     return out
 
 

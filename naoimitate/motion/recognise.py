@@ -1,23 +1,23 @@
-"""Which joints of a skeleton are the landmarks of a person: by their names, proved by the hierarchy, else by it alone."""
+"""Which joints of a skeleton are a person's landmarks: by names that the hierarchy confirms, else by it alone."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import SIDES
-from naoimitate.motion.clip import Skeleton
+from naoimitate.motion.clip import Clip, Skeleton
 from naoimitate.motion.families import family_of
-from naoimitate.motion.names import HANDS, HEADS, PARTS, is_filler, plain_names, side_and_word
-from naoimitate.motion.structure import limbs_by_structure
+from naoimitate.motion.names import HANDS, HEADS, KNUCKLES, PARTS, is_filler, side_and_word
+from naoimitate.motion.structure import LIMBS, limbs_by_structure
 
-LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
-"""Joints of a leg and of an arm, from the body outwards."""
 BONE_RATIO = 3.5
 """The two bones of one limb differ by less than this factor (people: 1.0 and 1.3; CMU's skeletons up to 2.3)."""
+POSTURES = 50
+"""So many postures of a recording are enough to tell left from right."""
 SHORT = 0.02
 """Bones below this share of a leg have no direction."""
 
@@ -27,8 +27,8 @@ class Anatomy:
     """Where a person's landmarks are in a skeleton.
 
     family: what the skeleton is, for people. nodes: landmark to node, for shoulders, elbows, wrists, hips, knees and
-    ankles always, for hands, toes and head where the skeleton has them. pelvis, chest: nodes from which legs and arms
-    part (the same one when there is no spine). head: the joint about which the head turns. head_end: the end of its bone.
+    ankles always, for hands and toes where the skeleton has them. pelvis, chest: nodes from which legs and arms part
+    (the same one when there is no spine). head: the joint about which the head turns. head_end: the end of its bone.
     palms: (left, right) joints that turn the hands.
     """
 
@@ -41,11 +41,12 @@ class Anatomy:
     palms: tuple[int, int]
 
 
-def recognise(skeleton: Skeleton) -> Anatomy:
-    """Find the landmarks.
+def recognise(clip: Clip) -> Anatomy:
+    """Find the landmarks of a recording's skeleton.
 
     Raises MotionFormatError, which names the first landmark that is missing, when it is no person with arms and legs.
     """
+    skeleton = clip.skeleton
     words = _words(skeleton)
     family = family_of(skeleton)
     nodes: dict[str, int] | None = {}
@@ -58,7 +59,7 @@ def recognise(skeleton: Skeleton) -> Anatomy:
             elif nodes is not None:
                 nodes.update({f"{side}_{part}": node for part, node in zip(limb, chain, strict=True)})
     if missing:
-        nodes = limbs_by_structure(skeleton)
+        nodes = limbs_by_structure(skeleton, clip.positions[:: max(1, len(clip) // POSTURES)])
         family = family or "a skeleton of unknown names, recognised by its two arms and two legs"
     if nodes is None:
         raise MotionFormatError(f"no {missing} was found in the skeleton: export a whole body with common joint names")
@@ -73,14 +74,14 @@ def recognise(skeleton: Skeleton) -> Anatomy:
 
 def _words(skeleton: Skeleton) -> list[tuple[str, str]]:
     """Side and word of every joint's name; ends and helper joints have none."""
-    words = [side_and_word(name) for name in plain_names(skeleton.names)]
+    words = [side_and_word(name) for name in skeleton.names]
     return [("", "") if end or is_filler(w[1]) else w for w, end in zip(words, skeleton.ends, strict=True)]
 
 
 def _chain(skeleton: Skeleton, words: list[tuple[str, str]], side: str, limb: tuple[str, ...]) -> tuple[int, ...] | str:
     """The joints of a limb: each above the next, as few joints between them as possible; or what is missing.
 
-    So ``LeftShoulder`` is the shoulder joint where nothing nearer to the elbow is called an arm, and a collar elsewhere.
+    So ``LeftShoulder`` is the shoulder joint only where nothing nearer to the elbow is called an arm.
     """
     candidates = [[i for i, w in enumerate(words) if w[0] == side and w[1] in PARTS[part]] for part in limb]
     if not candidates[2]:
@@ -96,7 +97,7 @@ def _chain(skeleton: Skeleton, words: list[tuple[str, str]], side: str, limb: tu
 
 def _is_limb(skeleton: Skeleton, chain: tuple[int, ...]) -> bool:
     """Whether each joint is above the next, with two bones of about the same length between them."""
-    upper, lower = (bone_length(skeleton, a, b) for a, b in zip(chain, chain[1:], strict=False))
+    upper, lower = (bone_length(skeleton, a, b) for a, b in pairwise(chain))
     return min(upper, lower) > 0.0 and max(upper, lower) < BONE_RATIO * min(upper, lower)
 
 
@@ -125,18 +126,27 @@ def _junction(skeleton: Skeleton, a: int, b: int) -> int:
 def _extremities(skeleton: Skeleton, words: list[tuple[str, str]], side: str, nodes: dict[str, int]) -> dict[str, int]:
     """Hand (knuckle) and toe (ball) of one side: named joints below wrist and ankle, else the ends of their bones."""
     found = {}
-    for part, name, above in (("knuckle", "hand", "wrist"), ("toe", "toe", "ankle")):
+    for vocabulary, name, above in ((HANDS + KNUCKLES, "hand", "wrist"), (PARTS["toe"], "toe", "ankle")):
         start = nodes[f"{side}_{above}"]
         short = SHORT * leg_length(skeleton, nodes)
-        below = [i for i in skeleton.below(start) if bone_length(skeleton, start, i) > short]
-        named = [i for i in below if words[i][0] in (side, "") and words[i][1] in PARTS[part]]
+        far = {i: bone_length(skeleton, start, i) for i in skeleton.below(start)}
+        below = [i for i, distance in far.items() if distance > short]
+        named = [i for i in below if words[i][0] in (side, "") and words[i][1] in vocabulary]
         ends = [i for i in below if skeleton.ends[i] and _only_way(skeleton, start, i)]
         choice = named or ends
         if choice:
-            found[f"{side}_{name}"] = min(
-                choice, key=lambda i: (len(skeleton.path(i)), -bone_length(skeleton, start, i))
-            )
+            depth = {i: len(skeleton.path(i)) for i in choice}
+            nearest = min(depth.values())
+            found[f"{side}_{name}"] = max((i for i in choice if depth[i] == nearest), key=far.__getitem__)
+        elif inner := [i for i in skeleton.children(start) if i in below]:
+            found[f"{side}_{name}"] = _middle_one(skeleton, inner)
     return found
+
+
+def _middle_one(skeleton: Skeleton, nodes: list[int]) -> int:
+    """Of joints that spread like fingers, the one in the middle."""
+    offsets = skeleton.offsets[nodes]
+    return nodes[int(np.argmin(np.linalg.norm(offsets - offsets.mean(axis=0), axis=1)))]
 
 
 def _palm(words: list[tuple[str, str]], nodes: dict[str, int], side: str) -> int:

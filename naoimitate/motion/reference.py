@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from naoimitate.core.frames import LANDMARK, SEGMENT, SIDES, Array
-from naoimitate.human.anthropometry import Anthropometry
+from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.body import LEG_BY_STATURE
 from naoimitate.motion.tpose import across, angle
 from naoimitate.motion.track import Track
@@ -18,6 +19,8 @@ REST_LEG = np.radians(45.0)
 REST_ARM = np.radians(100.0)
 REST_BEND = np.radians(60.0)
 """Within these a rest pose is that of a person: legs from straight down, upper arms from sideways, elbows and knees."""
+TOES_OUT = np.radians(60.0)
+"""Feet that seem to point further aside tell nothing."""
 SIGN = {"l": 1.0, "r": -1.0}
 DOWN = np.array([0.0, 0.0, -1.0])
 _BODY = ("pelvis", "chest", "head")
@@ -36,21 +39,39 @@ class Reference:
     stature: float
 
 
-def from_frame(track: Track, frame: int) -> Reference:
-    """Straighten the posture of one frame, z up: the feet are taken as flat as they are."""
+def from_frame(track: Track, frame: int, rest: Track) -> Reference:
+    """Straighten the posture of one frame, z up, in which the person stands with flat feet.
+
+    Where the feet point is told by the rest pose, in which they point ahead, or by the line from ankle to toe.
+    """
     landmarks, turns = track.landmarks[frame], track.turns[frame]
     left = across(landmarks)
     up = np.array([0.0, 0.0, 1.0])
-    return _straightened(landmarks, turns, np.column_stack([np.cross(left, up), left, up]), feet_follow_legs=False)
+    reference = _straightened(landmarks, turns, np.column_stack([np.cross(left, up), left, up]), feet_hang=False)
+    return _feet_ahead(reference, from_rest(rest))
+
+
+def _feet_ahead(reference: Reference, rest: Reference | None) -> Reference:
+    """The reference with feet that point ahead, so that a foot's frame in the posture shows where it points."""
+    turns = reference.turns.copy()
+    for side in SIDES:
+        row = SEGMENT[f"{side}_foot"]
+        ahead = reference.landmarks[LANDMARK[f"{side}_toe"]] - reference.landmarks[LANDMARK[f"{side}_ankle"]]
+        if rest is not None:
+            ahead = (turns[row] @ rest.turns[row].T)[:, 0]
+        yaw = math.atan2(ahead[1], ahead[0])
+        if abs(yaw) < TOES_OUT:
+            turns[row] = yaw_matrix(-yaw) @ turns[row]
+    return replace(reference, turns=turns)
 
 
 def from_rest(rest: Track) -> Reference | None:
-    """Straighten the rest pose, or None when it is not that of a standing person (bones along an axis, limbs folded)."""
+    """Straighten the rest pose; None when nobody stands like that (all bones along one axis, limbs folded)."""
     landmarks, turns = rest.landmarks[0], rest.turns[0]
     axes = _rest_axes(landmarks)
     if axes is None or not _is_human(landmarks @ axes):
         return None
-    return _straightened(landmarks, turns, axes, feet_follow_legs=True)
+    return _straightened(landmarks, turns, axes, feet_hang=True)
 
 
 def best_standing_frame(landmarks: Array) -> int:
@@ -69,7 +90,7 @@ def best_standing_frame(landmarks: Array) -> int:
 
 
 def _rest_axes(landmarks: Array) -> Array | None:
-    """World axes (3, 3) of a rest pose as columns: forward, left, up; snapped to the file's axes where they nearly are."""
+    """World axes (3, 3) of a rest pose as columns: forward, left, up; the file's own axes where they are near."""
     shoulders = landmarks[LANDMARK["l_shoulder"]] + landmarks[LANDMARK["r_shoulder"]]
     up = _snapped(0.5 * shoulders - landmarks[LANDMARK["pelvis"]])
     left = landmarks[LANDMARK["l_hip"]] - landmarks[LANDMARK["r_hip"]]
@@ -106,18 +127,18 @@ def _is_human(body: Array) -> bool:
     return good
 
 
-def _straightened(landmarks: Array, turns: Array, axes: Array, feet_follow_legs: bool) -> Reference:
+def _straightened(landmarks: Array, turns: Array, axes: Array, feet_hang: bool) -> Reference:
     """Turn every limb, bone by bone and by the smallest rotation, into the T-pose; the trunk stays as it is.
 
-    feet_follow_legs: in a rest pose the foot hangs on the leg; in a recorded posture it stands flat already.
+    feet_hang: the feet may be rolled with spread legs, as in a rest pose; else they stand flat.
     """
     body = (landmarks - landmarks[LANDMARK["pelvis"]]) @ axes
     turned = axes.T @ turns
     out, leg = body.copy(), 0.0
     for side, sign in SIGN.items():
         hip, knee, ankle, toe = (LANDMARK[f"{side}_{n}"] for n in ("hip", "knee", "ankle", "toe"))
-        follow = _stretch(body, out, (hip, knee, ankle), DOWN)
-        foot = follow if feet_follow_legs else np.eye(3)
+        _stretch(body, out, (hip, knee, ankle), DOWN)
+        foot = _flat(body[ankle] - body[knee], body[toe] - body[ankle]) if feet_hang else np.eye(3)
         out[toe] = out[ankle] + foot @ (body[toe] - body[ankle])
         turned[SEGMENT[f"{side}_foot"]] = foot @ turned[SEGMENT[f"{side}_foot"]]
         shoulder, elbow, wrist, hand = (LANDMARK[f"{side}_{n}"] for n in ("shoulder", "elbow", "wrist", "hand"))
@@ -137,6 +158,18 @@ def _stretch(body: Array, out: Array, limb: tuple[int, int, int], direction: Arr
         follow = _smallest_turn(follow @ bone, direction) @ follow
         out[b] = out[a] + np.linalg.norm(bone) * direction
     return follow
+
+
+def _flat(shank: Array, toe: Array) -> Array:
+    """Rotation (3, 3) that lays the foot flat: none, but for a foot that is rolled with its spread leg.
+
+    Then its toe, which points inwards or outwards with the spread, comes to point ahead (CMU's rest poses).
+    """
+    spread = math.atan2(shank[1], -shank[2])
+    c, s = math.cos(spread), math.sin(spread)
+    roll = np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+    rolled = not np.isnan(toe).any() and abs((roll @ toe)[1]) < abs(toe[1])
+    return roll if rolled else np.eye(3)
 
 
 def _smallest_turn(a: Array, b: Array) -> Array:

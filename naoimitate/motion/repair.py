@@ -31,7 +31,7 @@ def bridged(track: Track, rate: float) -> tuple[Track, list[str]]:
     """
     landmarks = track.landmarks.copy()
     with np.errstate(invalid="ignore"):
-        bad = ~(np.abs(landmarks) < FARTHEST).all(axis=-1)
+        bad = np.asarray(~(np.abs(landmarks) < FARTHEST).all(axis=-1))
     landmarks[bad] = np.nan
     for name in NEEDED:
         if bad[:, LANDMARK[name]].all():

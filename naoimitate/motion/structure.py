@@ -9,10 +9,12 @@ import numpy as np
 
 from naoimitate.core.frames import Array
 from naoimitate.motion.clip import Skeleton
-from naoimitate.motion.names import plain_names, side_and_word
+from naoimitate.motion.names import side_and_word
 
 SAME_LENGTH = 0.04
 """Left and right limb of a person differ by less than this share."""
+LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+"""Joints of a leg and of an arm, from the body outwards."""
 LIMB_SHARE = 0.4
 """An arm is longer than this share of a leg; pairs of fingers and eyes are not."""
 
@@ -26,14 +28,17 @@ class _Pair:
     length: float
 
 
-def limbs_by_structure(skeleton: Skeleton) -> dict[str, int] | None:
-    """Hip, knee, ankle, shoulder, elbow and wrist of both sides as nodes by landmark; None when there is no person."""
+def limbs_by_structure(skeleton: Skeleton, postures: Array) -> dict[str, int] | None:
+    """Hip, knee, ankle, shoulder, elbow and wrist of both sides as nodes by landmark; None when there is no person.
+
+    postures: (K, J, 3) of the recording, in which the toes tell what is in front.
+    """
     pairs = sorted(_pairs(skeleton), key=lambda p: -p.length)
     for first, second in combinations(pairs, 2):
         if second.length < LIMB_SHARE * first.length or set(first.chains[0]) & set(second.chains[0]):
             continue
         legs, arms = _legs_and_arms(skeleton, first, second)
-        found = _assigned(skeleton, legs, arms)
+        found = _assigned(skeleton, postures, legs, arms)
         if found:
             return found
     return None
@@ -70,12 +75,12 @@ def _legs_and_arms(skeleton: Skeleton, first: _Pair, second: _Pair) -> tuple[_Pa
     return (second, first) if second.branch in skeleton.path(first.branch)[1:] else (first, second)
 
 
-def _assigned(skeleton: Skeleton, legs: _Pair, arms: _Pair) -> dict[str, int] | None:
+def _assigned(skeleton: Skeleton, postures: Array, legs: _Pair, arms: _Pair) -> dict[str, int] | None:
     leg = [_two_long_bones(skeleton, chain) for chain in legs.chains]
     arm = [_two_long_bones(skeleton, chain) for chain in arms.chains]
     if not all(leg) or not all(arm):
         return None
-    left_leg, left_arm = (_left_one(skeleton, pair, legs, arms) for pair in (legs, arms))
+    left_leg, left_arm = (_left_one(skeleton, postures, pair, legs, arms) for pair in (legs, arms))
     if left_leg is None or left_arm is None:
         return None
     found: dict[str, int] = {}
@@ -101,18 +106,20 @@ def _two_long_bones(skeleton: Skeleton, chain: list[int]) -> list[int]:
     return apart[best - 1 : best + 2]
 
 
-def _left_one(skeleton: Skeleton, pair: _Pair, legs: _Pair, arms: _Pair) -> int | None:
+def _left_one(skeleton: Skeleton, postures: Array, pair: _Pair, legs: _Pair, arms: _Pair) -> int | None:
     """0 or 1: which chain of a pair is the left one, by the side in its names, else by where the toes point."""
-    plain = plain_names(skeleton.names)
-    votes = [[side_and_word(plain[i])[0] for i in chain] for chain in pair.chains]
+    votes = [[side_and_word(skeleton.names[i])[0] for i in chain] for chain in pair.chains]
     score = [v.count("l") - v.count("r") for v in votes]
     if score[0] != score[1]:
         return int(np.argmax(score))
-    rest = skeleton.rest
-    up = rest[arms.branch] - rest[legs.branch]
-    ahead = sum((rest[c[-1]] - rest[_two_long_bones(skeleton, c)[2]] for c in legs.chains), np.zeros(3))
-    left = np.cross(up, ahead)
-    across = rest[pair.chains[0][-1]] - rest[pair.chains[1][-1]]
-    if np.linalg.norm(left) < 0.05 * np.linalg.norm(up) * np.linalg.norm(ahead) or abs(left @ across) < 1e-9:
+    ankles = [_two_long_bones(skeleton, chain)[2] for chain in legs.chains]
+    up = postures[:, arms.branch] - postures[:, legs.branch]
+    ahead = postures[:, [c[-1] for c in legs.chains]].sum(axis=1) - postures[:, ankles].sum(axis=1)
+    across = postures[:, pair.chains[0][0]] - postures[:, pair.chains[1][0]]
+    left = np.sum(np.cross(up, ahead) * across, axis=-1)
+    sure = np.abs(left) > 0.1 * np.linalg.norm(up, axis=-1) * np.linalg.norm(ahead, axis=-1) * np.linalg.norm(
+        across, axis=-1
+    )
+    if not sure.any():
         return None
-    return 0 if left @ across > 0.0 else 1
+    return 0 if np.median(left[sure]) > 0.0 else 1

@@ -43,7 +43,7 @@ def angle(a: Array, b: Array) -> Array:
 
 def across(landmarks: Array) -> Array:
     """Horizontal unit direction (..., 3) to the person's left, the mean of the lines of hips and shoulders, z up."""
-    total = np.zeros(landmarks.shape[:-2] + (3,))
+    total = np.zeros((*landmarks.shape[:-2], 3))
     for part in ("hip", "shoulder"):
         line = landmarks[..., LANDMARK[f"l_{part}"], :] - landmarks[..., LANDMARK[f"r_{part}"], :]
         total += line / np.maximum(np.linalg.norm(line, axis=-1, keepdims=True), 1e-9)
@@ -53,7 +53,7 @@ def across(landmarks: Array) -> Array:
 
 
 def is_tpose(landmarks: Array) -> npt.NDArray[np.bool_]:
-    """Whether each posture (T, 19, 3) m, z up, is a T-pose: arms out and straight, legs and trunk upright, feet level."""
+    """Whether each posture (T, 19, 3) m, z up, is a T-pose: arms out and straight, body upright, feet level."""
 
     def line(a: str, b: str) -> Array:
         return np.asarray(landmarks[:, LANDMARK[b]] - landmarks[:, LANDMARK[a]])

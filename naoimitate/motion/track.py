@@ -14,7 +14,7 @@ HEAD_END = (0.05, 0.45)
 """A head's bone that ends between these shares of the leg away reaches the top of the head or the brow; its middle is
 taken as the head's centre (real heads: 0.21, CMU's: 0.11)."""
 CHEST_RANGE = (0.15, 1.02)
-"""The joint from which the arms part is the chest when it lies between these shares of the way from hips to shoulders."""
+"""The joint from which the arms part is the chest when it is between these shares of the way from hips to shoulders."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +57,7 @@ def _extract(positions: Array, rotations: Array, rest: Array, anatomy: Anatomy) 
     landmarks = np.full((len(positions), len(LANDMARKS), 3), np.nan)
     for name, node in anatomy.nodes.items():
         landmarks[:, LANDMARK[name]] = positions[:, node]
-    mid_hip, mid_shoulder = _middle(landmarks, "hip"), _middle(landmarks, "shoulder")
-    landmarks[:, LANDMARK["pelvis"]] = mid_hip
+    landmarks[:, LANDMARK["pelvis"]] = 0.5 * (landmarks[:, LANDMARK["l_hip"]] + landmarks[:, LANDMARK["r_hip"]])
     if anatomy.chest != anatomy.pelvis and _is_chest(rest, anatomy):
         landmarks[:, LANDMARK["chest"]] = positions[:, anatomy.chest]
     if anatomy.head is not None:
@@ -72,10 +71,6 @@ def _extract(positions: Array, rotations: Array, rest: Array, anatomy: Anatomy) 
         turns[:, SEGMENT[f"{side}_hand"]] = rotations[:, palm]
         turns[:, SEGMENT[f"{side}_foot"]] = rotations[:, anatomy.nodes[f"{side}_ankle"]]
     return Track(landmarks, turns)
-
-
-def _middle(landmarks: Array, name: str) -> Array:
-    return np.asarray(0.5 * (landmarks[..., LANDMARK[f"l_{name}"], :] + landmarks[..., LANDMARK[f"r_{name}"], :]))
 
 
 def _is_chest(rest: Array, anatomy: Anatomy) -> bool:
