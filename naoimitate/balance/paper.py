@@ -85,7 +85,7 @@ class PaperFeet:
         self._fsm, self._landed, self._side, self._share = SupportFsm(), False, 0, 1.0
         self._offset, self._speed = self._planted.offset, 0.0
         self._mapped = pose.q[self._leg_joints]
-        self._between = wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1]))
+        self._between = max(0.0, wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1])))
         half = 0.5 * self._between
         self._apart = FEET_APART - self._inner_edge(0, half) + self._inner_edge(1, -half)
         self._stance_pos, self._stance_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
