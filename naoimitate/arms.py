@@ -36,6 +36,8 @@ BRANCH_SPEED = 0.6
 """Share of the joints' speed limit at which an arm changes its posture."""
 BRANCH_BRAKING = 20.0
 """[rad/s^2] with which it comes to rest there."""
+AT_END, AT_BOUND = 0.02, 1e-6
+"""[rad] from a joint's end, and from what a frame allows, at which it counts as there."""
 BRANCH_NEAR = 0.1
 """[rad] from the other posture at which the hand is followed again."""
 
@@ -113,6 +115,15 @@ class Arms:
         if found[0] == 0:
             found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.low, reach.high, *rows)
         return found
+
+    def hurried(self, side: int, q: Array, reach: Reach) -> bool:
+        """Whether an arm has moved as fast as it may in this frame, joints at their ends apart."""
+        if self._branch[side] is not None:
+            return True
+        limb = self._limbs[side]
+        angles, low, high = q[limb.joints], reach.smooth_low[limb.joints], reach.smooth_high[limb.joints]
+        inside = (angles - limb.lower > AT_END) & (limb.upper - angles > AT_END)
+        return bool((inside & ((angles - low < AT_BOUND) | (high - angles < AT_BOUND))).any())
 
     def _as_published(self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array) -> int:
         """The paper's iterations, then the nearest angles within speed, range and clear of the body (section V-D)."""

@@ -120,7 +120,9 @@ class Imitator:
         self._clearance.look(pose)
         q, arm_iterations = self._arms.solve(pose, hands, seen, reach, self._clearance)
         self._arms.head(q, seen.head, self.settings.limits.head_speed * dt, reach.low, reach.high)
+        hurried = [self._arms.hurried(side, q, reach) for side in (0, 1)]
         answer = self._retargeting.step(pose, q, feet, footing, reach)
+        self._hurried = np.where(hurried, np.linalg.norm(hands - self._arms.hands(answer.pose), axis=1), 0.0)
         self._pose = answer.pose
         self._feet_velocity = (answer.pose.soles_in_base - pose.soles_in_base) / dt
         self._velocity = (answer.pose.q - pose.q) / dt
@@ -179,6 +181,7 @@ class Imitator:
         assert self._pose is not None
         self._hands.restart(self._arms.hands(self._pose))
         self._feet.restart(self._pose.soles_in_base - self._hips)
+        self._hurried = np.zeros(2)
         self._feet_velocity, self._velocity = np.zeros((2, 3)), np.zeros(len(self.robot.joint_names))
 
     def _footing(self, seen: Observation, targets: Array, ahead: str, may_lift: bool) -> Footing:
@@ -220,7 +223,7 @@ class Imitator:
     def lag(self) -> float:
         """How far (m) the hands and a swing foot are behind their targets at their speed limits."""
         feet = self._feet.behind[[self.mode.stance == "R", self.mode.stance == "L"]]
-        return float(np.concatenate([self._hands.behind, feet]).max())
+        return float(np.concatenate([self._hands.behind, self._hurried, feet]).max())
 
     def _command(self, seen: Observation, footing: Footing, given_up: GivenUp, iterations: int) -> RobotCommand:
         pose = self._pose
