@@ -123,7 +123,7 @@ class Planted:
             (calm, reach.smooth_low, reach.smooth_high, rows[1]),
             (calm, reach.low, reach.high, rows[1]),
             (_may_stop(calm), reach.low, reach.high, rows[1]),
-            (goal, reach.low, reach.high, np.minimum(rows[1], 0.0)),
+            (goal._replace(lever=np.full(2, np.inf)), reach.low, reach.high, np.minimum(rows[1], 0.0)),
         )
         start, iterations = q.copy(), 0
         for wish, low, high, bounds in ways:
