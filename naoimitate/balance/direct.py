@@ -10,7 +10,7 @@ from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
-from naoimitate.balance.soles import shortened, uncoupled_leg
+from naoimitate.balance.soles import into_tables, shortened, uncoupled_leg
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, yaw_matrix
 from naoimitate.fsm import Mode
@@ -27,7 +27,7 @@ class Direct:
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
         self._robot, self._maker, self._planted, self._ik = robot, maker, planted, ik
-        self._rows = legs.sole_joint + 1
+        self._legs, self._rows = legs, legs.sole_joint + 1
         self._limbs = [uncoupled_leg(robot, legs, side) for side in "lr"]
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
@@ -43,6 +43,7 @@ class Direct:
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._robot.tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
         q = shortened(pose.q, q, reach.low, reach.high)
+        into_tables(self._legs, q)
         side = 1 if self.mode is Mode.RIGHT else 0
         hung = self._maker.hang(q, side, pose.sole_pos, pose.sole_rot)
         return Answer(self._upright(hung, pose, side, footing), GivenUp.BALANCE, 2 * self._ik.leg_iterations)
