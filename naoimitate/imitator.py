@@ -122,7 +122,9 @@ class Imitator:
         self._arms.head(q, seen.head, self.settings.limits.head_speed * dt, reach.low, reach.high)
         hurried = [self._arms.hurried(side, q, reach) for side in (0, 1)]
         answer = self._retargeting.step(pose, q, feet, footing, reach)
-        self._hurried = np.where(hurried, np.linalg.norm(hands - self._arms.hands(answer.pose), axis=1), 0.0)
+        missed = np.linalg.norm(hands - self._arms.hands(answer.pose), axis=1)
+        self._unreached = np.where(hurried, np.minimum(self._unreached, missed), missed)
+        self._hurried = missed - self._unreached
         self._pose = answer.pose
         self._feet_velocity = (answer.pose.soles_in_base - pose.soles_in_base) / dt
         self._velocity = (answer.pose.q - pose.q) / dt
@@ -181,7 +183,7 @@ class Imitator:
         assert self._pose is not None
         self._hands.restart(self._arms.hands(self._pose))
         self._feet.restart(self._pose.soles_in_base - self._hips)
-        self._hurried = np.zeros(2)
+        self._hurried, self._unreached = np.zeros(2), np.full(2, np.inf)
         self._feet_velocity, self._velocity = np.zeros((2, 3)), np.zeros(len(self.robot.joint_names))
 
     def _footing(self, seen: Observation, targets: Array, ahead: str, may_lift: bool) -> Footing:

@@ -339,10 +339,10 @@ def solve_legs(
             lever = np.dot(arm, np.cross(com - at, up))
             if iteration == 0:
                 most[k] = max(goal.lever[k], abs(lever) - LEVER_STEP)
-            side_way, turn_way = np.cross(up, arm), np.cross(arm, com - at)
+            side_way, turn_way = np.cross(up, arm), np.cross(up, np.cross(arm, com - at))
             for i in range(n):
-                tilt = np.cross(Ws[:, i], up)
-                C[row, i] = np.dot(side_way, Jraw[:, i] - Jk[:, i]) + np.dot(turn_way, tilt)
+                for a in range(3):
+                    C[row, i] += side_way[a] * (Jraw[a, i] - Jk[a, i]) + turn_way[a] * Ws[a, i]
             C[row + 1] = -C[row]
             b[row], b[row + 1] = -most[k] - lever, lever - most[k]
             row += 2
