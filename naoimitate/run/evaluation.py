@@ -43,7 +43,7 @@ def summary(evaluation: Evaluation, robot: RobotModel) -> str:
         [
             "# Koenemann, Burget, Bennewitz 2014, evaluated again",
             "",
-            f"{robot.name} {robot.version}; persons seen at {CAMERA_RATE:g} Hz, {1000 * NOISE:g} mm of sensor noise;",
+            f"{robot.name} {robot.version}; persons seen at {CAMERA_RATE:g} Hz, {1000 * NOISE:g} mm of white noise;",
             f"{count} repetitions each. The paper used a real NAO v4 and a person in an Xsens suit.",
             "",
             "## Similarity (Figures 7 and 8) and stability",
@@ -65,19 +65,20 @@ def summary(evaluation: Evaluation, robot: RobotModel) -> str:
 
 
 def _errors_table(cases: tuple[Case, ...]) -> str:
-    paper = ("paper", "theirs", f"{PAPER_ERRORS_CM['hands']}", f"{PAPER_ERRORS_CM['feet']}", "", "never fell")
+    paper = ("(published)", "theirs", f"{PAPER_ERRORS_CM['hands']}", f"{PAPER_ERRORS_CM['feet']}", "", "never fell")
     rows = [
         (
             _plain(case.motion),
             case.parameters,
             f"{case.hand_errors.mean():.2f} ± {case.hand_errors.std():.2f}",
+            f"{case.hand_excess.mean():.2f}",
             f"{case.foot_errors.mean():.2f} ± {case.foot_errors.std():.2f}",
             f"{case.least_margin:.1f}",
             f"{sum(case.fell)} of {len(case.fell)} fell" if case.fell else "",
         )
         for case in cases
     ]
-    header = ("motion", "parameters", "hands, cm", "feet, cm", "least margin, mm", "in physics")
+    header = ("motion", "parameters", "hands, cm", "beyond reach, cm", "feet, cm", "least margin, mm", "in physics")
     return markdown(header, [paper, *rows])
 
 
@@ -93,7 +94,8 @@ def _table_one(tables: dict[tuple[str, str], Table]) -> str:
 
 def _baseline(baseline: Baseline) -> str:
     end = {None: "not simulated", True: "FELL in physics", False: "did not fall in physics"}[baseline.fell]
-    return f"centre of mass outside the soles in {100.0 * baseline.outside:.1f} % of the frames, {end}"
+    outside = f"centre of mass not over what touches the floor in {100.0 * baseline.outside:.1f} % of the frames"
+    return f"{outside}, soles that should stand tilted by up to {baseline.tilt:.1f} deg, {end}"
 
 
 def _plain(motion: str) -> str:

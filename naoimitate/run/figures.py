@@ -25,7 +25,7 @@ from naoimitate.run.stability import MIN_MARGIN, PLANNED_MARGIN, margins_at_fram
 
 COLOURS = {"D": "#9aa5b1", "L": "#2f6fb0", "R": "#d9822b", "F": "#c0392b"}
 MODE_NAMES = {"D": "double", "L": "left", "R": "right", "F": "flight"}
-HUMAN, ROBOT, BAR = "#555555", "#2f6fb0", "#c0392b"
+HUMAN, ROBOT, BAR = "#b9c0c7", "#2f6fb0", "#c0392b"
 LEFT, RIGHT = COLOURS["L"], COLOURS["R"]
 WIDTH, LEFT_EDGE, RIGHT_EDGE, BOTTOM, TOP = 9.0, 0.85, 0.15, 0.5, 0.3
 """Width of every figure and its margins, inch: the same for all, so that their time axes lie above each other."""
@@ -65,7 +65,7 @@ def draw_support(axes: Axes, subject: Subject) -> None:
 def draw_offset(axes: Axes, subject: Subject) -> None:
     """The normalised offset of the centre of mass between the feet (the paper's Fig. 9)."""
     run = subject.run
-    axes.plot(run.time, run.human_offset, color=HUMAN, label="person")
+    axes.plot(run.time, run.human_offset, color=HUMAN, lw=3.5, label="person")
     axes.plot(run.time, run.offset, color=ROBOT, label="robot")
     axes.set(ylabel="offset", ylim=(-0.05, 1.05))
     axes.set_yticks([0, 0.5, 1], ["left 0", "0.5", "right 1"])

@@ -11,14 +11,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
 
 from naoimitate.core.frames import Array, Motion
+from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.robot.model import RobotModel
+from naoimitate.run.contact import sole_tilt
 from naoimitate.run.file import Run
 from naoimitate.run.recorded import imitate
-from naoimitate.run.replay import frames
-from naoimitate.run.similarity import FEET, HANDS, errors
+from naoimitate.run.replay import Replay, frames
+from naoimitate.run.similarity import FEET, HANDS, errors, hand_excess
 from naoimitate.run.stability import margins_at_frames
 from naoimitate.settings import PAPER, Settings
 
@@ -27,10 +28,12 @@ REPETITIONS = 10
 CAMERA_RATE = 30.0
 """Frames a second at which the person is seen, Hz (the paper's section VI-C)."""
 NOISE = 0.002
-"""Standard deviation of every landmark's coordinates, m: inertial suits publish a few mm; no figure in the paper."""
-NOISE_TIME = 0.1
-"""The noise is smooth over this time, s: a suit's posture comes from a filter and does not jump."""
-PARAMETER_SETS = {"paper": PAPER, "ours": Settings()}
+"""Standard deviation of the white noise on every landmark's coordinates, m: the paper gives no figure; harsher than a
+suit's, whose filter smooths it."""
+TOUCHING = 0.002
+"""Height above a sole's lowest point up to which its points count as touching the floor, m: what a sole gives."""
+PARAMETER_SETS = {"theirs": PAPER, "ours": Settings()}
+"""The paper's parameters, and our defaults."""
 PAPER_ERRORS_CM = {"hands": 1.4, "feet": 1.6}
 """Mean errors over ten repetitions of the complex sequence (the paper's section VI-A), cm."""
 
@@ -42,14 +45,15 @@ Simulate = Callable[[Run], Run]
 class Case:
     """One motion with one set of parameters: the runs of all repetitions and what they show.
 
-    hand_errors, foot_errors: (repetitions,) mean of a run, cm. least_margin: mm over all runs. fell: of each simulated
-    run; empty without simulation.
+    hand_errors, foot_errors: (repetitions,) mean of a run, cm. hand_excess: the same of the hands beyond what the arms
+    could have reached. least_margin: mm over all runs. fell: of each simulated run; empty without simulation.
     """
 
     motion: str
     parameters: str
     runs: tuple[Run, ...]
     hand_errors: Array
+    hand_excess: Array
     foot_errors: Array
     least_margin: float
     fell: tuple[bool, ...]
@@ -58,19 +62,19 @@ class Case:
 @dataclass(frozen=True)
 class Baseline:
     """The direct imitation without stabilisation. outside: share of frames with the centre of mass outside the soles.
-    fell: in simulation, None without one."""
+    tilt: deg, of the soles that should stand, largest. fell: in simulation, None without one."""
 
     motion: str
     run: Run
     outside: float
+    tilt: float
     fell: bool | None
 
 
 def noisy(motion: Motion, seed: int) -> Motion:
-    """The motion as a noisy suit sees it: smooth Gaussian noise of ``NOISE`` on every coordinate of every landmark."""
-    white = np.random.default_rng(seed).normal(size=motion.landmarks.shape)
-    smooth = gaussian_filter1d(white, NOISE_TIME * motion.rate, axis=0, mode="nearest")
-    return replace(motion, landmarks=motion.landmarks + NOISE * smooth / smooth.std())
+    """The motion as a noisy suit sees it: white noise of ``NOISE`` on every coordinate of every landmark."""
+    noise = np.random.default_rng(seed).normal(scale=NOISE, size=motion.landmarks.shape)
+    return replace(motion, landmarks=motion.landmarks + noise)
 
 
 def repeat(
@@ -89,6 +93,7 @@ def repeat(
         parameters=parameters,
         runs=tuple(runs),
         hand_errors=np.array([e[:, HANDS].mean() for e in error]),
+        hand_excess=np.array([100.0 * (hand_excess(r, robot, p) or 0.0) for r, p in zip(runs, poses, strict=True)]),
         foot_errors=np.array([e[:, FEET].mean() for e in error]),
         least_margin=1000.0 * min(float(margins_at_frames(r, p).min()) for r, p in zip(runs, poses, strict=True)),
         fell=tuple(bool(run.sim_fell) for run in runs if run.sim_fell is not None),
@@ -98,6 +103,8 @@ def repeat(
 def direct_baseline(motion: Motion, robot: RobotModel, simulate: Simulate | None) -> Baseline:
     """The motion imitated without stabilisation, with the paper's parameters, and played in physics."""
     run = imitate(noisy(motion, 0), robot, replace(PAPER, retarget="direct"), sample=CAMERA_RATE)
-    outside = float((margins_at_frames(run, frames(run, robot)) < 0.0).mean())
+    poses = frames(run, robot)
+    outside = float((margins_at_frames(run, poses) < 0.0).mean())
+    tilt = float(np.degrees(sole_tilt(run, poses)))
     run = run if simulate is None else simulate(run)
-    return Baseline(motion.name, run, outside, run.sim_fell)
+    return Baseline(motion.name, run, outside, tilt, run.sim_fell)
