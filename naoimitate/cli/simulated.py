@@ -53,5 +53,5 @@ def write_pictures(
             with progress("drawing the video") as advance:
                 written.append(render_video(robot, run.time, q, base_pos, base_quat, video, **seen, progress=advance))
     except RenderingUnavailable as error:
-        click.echo(f"no pictures: {error}", err=True)
+        click.echo(f"naoimitate: {error}", err=True)
     return written

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
 from naoimitate.core.frames import LANDMARKS, SEGMENTS, Array, HumanFrame, Motion
+
+Scalar = TypeVar("Scalar", bound=np.generic)
 
 OTHER = {"L": "R", "R": "L"}
 """Support modes that change; D and F stay."""
@@ -63,5 +66,5 @@ def _orientations(orientations: Array | None) -> Array | None:
     return None if orientations is None else np.asarray(orientations[..., _SEGMENTS, :] * _FLIP_QUATERNION)
 
 
-def _swapped(pair: npt.NDArray[np.generic] | None) -> npt.NDArray[np.generic] | None:
+def _swapped(pair: npt.NDArray[Scalar] | None) -> npt.NDArray[Scalar] | None:
     return None if pair is None else pair[..., ::-1]

@@ -6,7 +6,7 @@ the body does not overlap itself. Solved from several starts by bounded Gauss-Ne
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,7 @@ LONGEST_STEP = 0.3
 """Of any joint in one step, rad."""
 
 Indices = npt.NDArray[np.int64]
+Floats = npt.NDArray[np.floating[Any]]
 
 
 class Arm(NamedTuple):
@@ -198,7 +199,7 @@ def _penalise(
 
 
 @njit(cache=True)
-def _bounded_step(H: Array, g: Array, damping: float, at: Array, lower: Array, upper: Array) -> Array:
+def _bounded_step(H: Array, g: Array, damping: float, at: Array, lower: Array, upper: Array) -> Floats:
     """Damped Gauss-Newton step in which joints that would leave their range stay where they are."""
     n = g.shape[0]
     A, b = H.copy(), -g
@@ -208,7 +209,7 @@ def _bounded_step(H: Array, g: Array, damping: float, at: Array, lower: Array, u
             A[:, k] = 0.0
             b[k] = 0.0
         A[k, k] += damping
-    step: Array = np.linalg.solve(A, b)
+    step = np.linalg.solve(A, b)
     longest = np.abs(step).max()
     if longest > LONGEST_STEP:
         step *= LONGEST_STEP / longest
