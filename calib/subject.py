@@ -44,7 +44,9 @@ def save_subject(subject: Subject, path: str | Path) -> None:
             "legs": [round(x, 4) for x in body.leg],
             "ankle_height": round(body.ankle_height, 4),
         },
-        "reference_m": {e: [round(float(x), 5) for x in row] for e, row in zip(EFFECTORS, subject.reference, strict=True)},
+        "reference_m": {
+            e: [round(float(x), 5) for x in row] for e, row in zip(EFFECTORS, subject.reference, strict=True)
+        },
         "tpose": {
             "landmarks_m": _rows(LANDMARKS, tpose.landmarks),
             "orientations_wxyz": None if tpose.orientations is None else _rows(SEGMENTS, tpose.orientations),
@@ -63,7 +65,9 @@ def load_subject(path: str | Path) -> Subject:
         landmarks = np.array([tpose["landmarks_m"][name] for name in LANDMARKS], dtype=np.float64)
         given = tpose["orientations_wxyz"]
         orientations = None if given is None else np.array([given[name] for name in SEGMENTS], dtype=np.float64)
-        if landmarks.shape != (len(LANDMARKS), 3) or (orientations is not None and orientations.shape != (len(SEGMENTS), 4)):
+        if landmarks.shape != (len(LANDMARKS), 3) or (
+            orientations is not None and orientations.shape != (len(SEGMENTS), 4)
+        ):
             raise CalibrationError(f"{path}: a landmark or orientation has the wrong number of values; calibrate again")
     except FileNotFoundError:
         raise CalibrationError(f"{path}: no such subject file; make one with `naoimitate calibrate`") from None

@@ -48,7 +48,9 @@ SETTLE_STEP = 0.1
 class Arms:
     """Both arms and the head of a robot."""
 
-    def __init__(self, robot: RobotModel, weights: LimbWeights, reserve: float, orientation: str, paper: PaperIk | None) -> None:
+    def __init__(
+        self, robot: RobotModel, weights: LimbWeights, reserve: float, orientation: str, paper: PaperIk | None
+    ) -> None:
         self._paper = paper
         self._robot, self._weights, self._orientation = robot, weights, orientation
         self._limbs = [build_limb(robot, f"{s}_arm", reserve) for s in "lr"]
@@ -57,7 +59,9 @@ class Arms:
         self._thorough = weights._replace(iterations=30.0)
         self._transit = weights._replace(tip=0.0, rest=0.1, iterations=1.0)
         self._anywhere = (robot.lower, robot.upper)
-        self._seeds = [np.unique([posture[limb.joints] for posture in robot.postures.values()], axis=0) for limb in self._limbs]
+        self._seeds = [
+            np.unique([posture[limb.joints] for posture in robot.postures.values()], axis=0) for limb in self._limbs
+        ]
         self.reset()
         self._head = robot.chains["head"]
         self._table = next((t for t in robot.tables if t.y in self._head), None)
@@ -69,9 +73,12 @@ class Arms:
 
     def hands(self, pose: Pose) -> Array:
         """Hands from the shoulders in the torso frame, (2, 3) m."""
-        return np.array([
-            pose.link_pos[limb.tip_joint + 1] + pose.link_rot[limb.tip_joint + 1] @ limb.tip - limb.root for limb in self._limbs
-        ])
+        return np.array(
+            [
+                pose.link_pos[limb.tip_joint + 1] + pose.link_rot[limb.tip_joint + 1] @ limb.tip - limb.root
+                for limb in self._limbs
+            ]
+        )
 
     def touches(self, side: int, clearance: Clearance) -> bool:
         """Whether an arm is kept from moving on by the body or the floor, in the pose last looked at."""
@@ -90,7 +97,9 @@ class Arms:
             clearance.look(pose)
         return pose.q
 
-    def solve(self, pose: Pose, targets: Array, seen: Observation, reach: Reach, clearance: Clearance) -> tuple[Array, int]:
+    def solve(
+        self, pose: Pose, targets: Array, seen: Observation, reach: Reach, clearance: Clearance
+    ) -> tuple[Array, int]:
         """Joint angles (J,) with both arms moved towards targets (2, 3) m, and the iterations it took."""
         q, iterations = pose.q.copy(), 0
         self._frames += 1
@@ -109,7 +118,9 @@ class Arms:
                 iterations += self._look_for_branch(side, q, task, misfit)
         return q, iterations
 
-    def _follow(self, limb: Limb, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]) -> tuple[int, float, float]:
+    def _follow(
+        self, limb: Limb, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
+    ) -> tuple[int, float, float]:
         """One frame of a limb, smooth where the body does not forbid it: (iterations, tip error m, misfit m)."""
         found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
         if found[0] == 0:
@@ -125,7 +136,9 @@ class Arms:
         inside = (angles - limb.lower > AT_END) & (limb.upper - angles > AT_END)
         return bool((inside & ((angles - low < AT_BOUND) | (high - angles < AT_BOUND))).any())
 
-    def _as_published(self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array) -> int:
+    def _as_published(
+        self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array
+    ) -> int:
         """The paper's iterations, then the nearest angles within speed, range and clear of the body (section V-D)."""
         before = q[limb.joints]
         solve_limb_fixed(self._robot.tree, limb, target, q, ik.damping, ik.arm_iterations)
@@ -143,7 +156,9 @@ class Arms:
         for seed in self._seeds[side]:
             trial = q.copy()
             trial[limb.joints] = seed
-            done, _, found = solve_limb(self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side])
+            done, _, found = solve_limb(
+                self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side]
+            )
             iterations += done
             if found < misfit - BRANCH_GAIN:
                 misfit, self._branch[side] = found, trial[limb.joints]
@@ -153,7 +168,9 @@ class Arms:
         """Move an arm of q through joint space towards its other posture, until that is near."""
         limb, goal = self._limbs[side], q.copy()
         goal[limb.joints] = self._branch[side]
-        done, _, _ = solve_limb(self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side])
+        done, _, _ = solve_limb(
+            self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side]
+        )
         if reach.dt == 0.0:
             q[limb.joints], self._branch[side] = goal[limb.joints], None
             return done

@@ -121,7 +121,9 @@ class Gate:
     def __init__(self, robot: RobotModel, legs: Legs, clearance: Clearance, limits: GateLimits) -> None:
         self._model, self._legs, self._clearance, self._limits = build_gate(robot), legs, clearance, limits
 
-    def passes(self, pose: Pose, before: Pose, stances: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float) -> bool:
+    def passes(
+        self, pose: Pose, before: Pose, stances: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float
+    ) -> bool:
         """Whether a pose may follow another one after dt s.
 
         stances: which feet carry, left and right, where ``planted_pos`` (2, 3) m and ``planted_rot`` (2, 3, 3) say.
@@ -140,14 +142,21 @@ class Gate:
         in_range = range_excess(self._model, pose.q) <= 0.0
         return clear and in_range and self.margin(pose, (True, True)) >= self._limits.margin
 
-    def moves(self, pose: Pose, before: Pose, fixed: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float) -> bool:
+    def moves(
+        self, pose: Pose, before: Pose, fixed: tuple[bool, bool], planted_pos: Array, planted_rot: Array, dt: float
+    ) -> bool:
         """Whether ranges and speeds hold, and the ``fixed`` soles stay where they are planted."""
         limits = self._limits
-        if range_excess(self._model, pose.q) > 0.0 or speed_ratio(self._model, pose.q, before.q, dt) > limits.speed_share:
+        if (
+            range_excess(self._model, pose.q) > 0.0
+            or speed_ratio(self._model, pose.q, before.q, dt) > limits.speed_share
+        ):
             return False
         return not any(
             fixed[side]
-            and outline_travel(self._legs, side, pose.sole_pos[side], pose.sole_rot[side], planted_pos[side], planted_rot[side])
+            and outline_travel(
+                self._legs, side, pose.sole_pos[side], pose.sole_rot[side], planted_pos[side], planted_rot[side]
+            )
             > limits.slip
             for side in (0, 1)
         )

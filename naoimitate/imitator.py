@@ -79,13 +79,21 @@ class Imitator:
         make = reachable_mapping if self.settings.reference == "reachable" else virtual_mapping
         self.mapping: Mapping = make(self.robot, subject.body, subject.reference)
         self._subject, self._pose = subject, None
-        self._observer = Observer(subject.body, subject.tpose)
+        self._observer = Observer(subject.body, subject.tpose, self.settings.hand_orientation == "follow")
         limits, still = self.settings.limits, np.zeros((2, 3))
         self._hands = Follower(still, limits.hand_speed, limits.hand_acceleration)
         self._feet = Follower(still, limits.foot_speed, limits.foot_acceleration)
         self._time, self._last_time, self._human_offset = 0.0, math.nan, 0.5
 
-    def step(self, frame: HumanFrame, dt: float | None = None, *, support: str | None = None, ahead: str = "", may_lift: bool = True) -> RobotCommand:
+    def step(
+        self,
+        frame: HumanFrame,
+        dt: float | None = None,
+        *,
+        support: str | None = None,
+        ahead: str = "",
+        may_lift: bool = True,
+    ) -> RobotCommand:
         """Imitate one frame, dt s (default: the difference of frame times) after the last one.
 
         The first call places the robot in the double support nearest to the frame. support: the person's mode where
@@ -112,7 +120,9 @@ class Imitator:
         lengths = np.linalg.norm(targets, axis=1)
         return np.asarray(targets * np.minimum(1.0, self._farthest / np.maximum(lengths, 1e-9))[:, None])
 
-    def _advance(self, pose: Pose, seen: Observation, targets: Array, footing: Footing, dt: float) -> tuple[GivenUp, int]:
+    def _advance(
+        self, pose: Pose, seen: Observation, targets: Array, footing: Footing, dt: float
+    ) -> tuple[GivenUp, int]:
         """One frame: limited targets, arms and head, then the legs under them."""
         reach = self._reach(pose, dt)
         hands = self._hands.step(targets[HANDS], dt)
@@ -171,7 +181,9 @@ class Imitator:
         pose = self._retargeting.place(q, targets[FEET], footing)
         if not self._gate.safe(pose):
             soles, held = standing.soles_in_base, GivenUp.HOLD
-            calm = replace(footing, support="D", offset=0.5, between=soles[1] - soles[0], torso=np.eye(3), headings=(0.0, 0.0))
+            calm = replace(
+                footing, support="D", offset=0.5, between=soles[1] - soles[0], torso=np.eye(3), headings=(0.0, 0.0)
+            )
             pose = self._retargeting.place(standing.q, soles - self._hips, calm)
         self._pose = pose
         self._time = 0.0
@@ -205,7 +217,13 @@ class Imitator:
         for side in (0, 1):
             if hands[side] > NOTICEABLE:
                 near = self._arms.touches(side, self._clearance)
-                missed |= GivenUp.SPEED if self._hands.behind[side] > NOTICEABLE else GivenUp.COLLISION if near else GivenUp.REACH
+                missed |= (
+                    GivenUp.SPEED
+                    if self._hands.behind[side] > NOTICEABLE
+                    else GivenUp.COLLISION
+                    if near
+                    else GivenUp.REACH
+                )
             if feet[side] > NOTICEABLE:
                 swings = self.mode.stance not in ("D", "LR"[side])
                 missed |= GivenUp.SPEED if swings and self._feet.behind[side] > NOTICEABLE else GivenUp.BALANCE

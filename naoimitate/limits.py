@@ -50,7 +50,15 @@ class Follower:
 
     def step(self, target: Array, dt: float) -> Array:
         """Advance (K, 3) points towards targets (K, 3) m by dt s and return where they are now."""
-        follow(self.position, self.velocity, self._target, np.ascontiguousarray(target), dt, self._speed, self._acceleration)
+        follow(
+            self.position,
+            self.velocity,
+            self._target,
+            np.ascontiguousarray(target),
+            dt,
+            self._speed,
+            self._acceleration,
+        )
         return self.position
 
     @property
@@ -77,7 +85,9 @@ def limited_step(p: Array, v: Array, target: Array, dt: float, max_speed: float,
 
 
 @njit(cache=True)
-def follow(p: Array, v: Array, last: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> None:
+def follow(
+    p: Array, v: Array, last: Array, target: Array, dt: float, max_speed: float, max_acceleration: float
+) -> None:
     """One step of points p, v (K, 3) towards ``target``, whose previous value is ``last``; all three are updated.
 
     The velocity is turned, within the acceleration, towards the target's own velocity plus the speed from which what
@@ -88,7 +98,9 @@ def follow(p: Array, v: Array, last: Array, target: Array, dt: float, max_speed:
         gap = math.sqrt(((last[k] - p[k]) ** 2).sum())
         approach = braking_speed(gap, max_acceleration, dt)
         for a in range(3):
-            wanted[a] = (target[k, a] - last[k, a]) / dt + (approach * (last[k, a] - p[k, a]) / gap if gap > 0.0 else 0.0)
+            wanted[a] = (target[k, a] - last[k, a]) / dt + (
+                approach * (last[k, a] - p[k, a]) / gap if gap > 0.0 else 0.0
+            )
         _shorten(wanted, max_speed)
         turn = wanted - v[k]
         _shorten(turn, max_acceleration * dt)

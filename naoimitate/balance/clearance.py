@@ -51,7 +51,17 @@ class Clearance:
 
     def look(self, pose: Pose) -> None:
         """Measure a pose."""
-        distances(self._shapes, self._pairs, pose.link_pos, pose.link_rot, self._settings.reach, self._d, self._a, self._b, self._normal)
+        distances(
+            self._shapes,
+            self._pairs,
+            pose.link_pos,
+            pose.link_rot,
+            self._settings.reach,
+            self._d,
+            self._a,
+            self._b,
+            self._normal,
+        )
         lowest_points(self._shapes, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, self._lowest)
 
     @property
@@ -94,7 +104,16 @@ def _bound(distance: float, safe: float, push: float) -> float:
 
 @njit(cache=True)
 def _contact_points(
-    shapes: ShapeArrays, pair: Ints, d: float, a: Array, b: Array, normal: Array, pos: Array, rot: Array, points: Array, gaps: Array
+    shapes: ShapeArrays,
+    pair: Ints,
+    d: float,
+    a: Array,
+    b: Array,
+    normal: Array,
+    pos: Array,
+    rot: Array,
+    points: Array,
+    gaps: Array,
 ) -> int:
     """Points (17, 3) m at which two shapes must not come nearer, their gaps (17,) m along the normal, and their number.
 

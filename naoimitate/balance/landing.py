@@ -43,6 +43,11 @@ class LandingSet:
         moved = bool(np.linalg.norm(x - p) > 1e-6 or abs(allowed - turn) > 1e-6)
         return x * mirror, allowed * mirror[1], moved
 
+    def middle(self, swing: int) -> Array:
+        """A place (2,) m well inside the set for feet that are parallel."""
+        outermost = [self.clip(0, 10.0 * direction, 0.0)[0] for direction in self.directions]
+        return np.mean(outermost, axis=0) * [1.0, 1.0 if swing == 0 else -1.0]
+
     def contains(self, swing: int, position: Array, yaw: float, tolerance: float = 0.002) -> bool:
         """Whether both feet can carry with the swing sole there; tolerance in m (and in rad * 0.1 m)."""
         nearest, allowed, _ = self.clip(swing, position, yaw)
@@ -53,7 +58,9 @@ def landing_set(robot: RobotModel) -> LandingSet:
     """The landing set kept in the robot's data; RobotModelError where there is none."""
     data = robot.data.get("landing")
     if data is None:
-        raise RobotModelError(f"robot {robot.name} has no landing set: compute it with `naoimitate robots --landing-set`")
+        raise RobotModelError(
+            f"robot {robot.name} has no landing set: compute it with `naoimitate robots --landing-set`"
+        )
     angles = np.array(data["directions_deg"]) * np.pi / 180.0
     directions = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     return LandingSet(np.array(data["yaws"], dtype=np.float64), directions, np.array(data["reach"], dtype=np.float64))

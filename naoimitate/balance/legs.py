@@ -244,7 +244,16 @@ def _add_task(J: Array, e: Array, weight: float, H: Array, g: Array) -> None:
 
 @njit(cache=True)
 def solve_legs(
-    tree: Tree, legs: Legs, weights: LegWeights, stance: Stance, goal: LegGoal, q: Array, q_low: Array, q_high: Array, rows: Array, bounds: Array
+    tree: Tree,
+    legs: Legs,
+    weights: LegWeights,
+    stance: Stance,
+    goal: LegGoal,
+    q: Array,
+    q_low: Array,
+    q_high: Array,
+    rows: Array,
+    bounds: Array,
 ) -> tuple[int, float, float]:
     """Move the leg joints of q (J,) rad towards the goal; the rest of q is given.
 

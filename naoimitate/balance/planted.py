@@ -59,7 +59,16 @@ class CalmTorso:
 class Planted:
     """Soles fixed in the world; the torso moves over them."""
 
-    def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, stride: Stride, weights: LegWeights, clearance: Clearance, gate: Gate) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        legs: Legs,
+        maker: PoseMaker,
+        stride: Stride,
+        weights: LegWeights,
+        clearance: Clearance,
+        gate: Gate,
+    ) -> None:
         self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
         self._weights, self._clearance, self._gate = weights, clearance, gate
         self._calm, self._turning, self._moving = CalmTorso(), np.zeros(3), np.zeros(3)
@@ -128,9 +137,7 @@ class Planted:
         start, iterations = q.copy(), 0
         for wish, low, high, bounds in ways:
             q[:] = start
-            done, closure, _ = solve_legs(
-                self._tree, self._legs, weights, stance, wish, q, low, high, rows[0], bounds
-            )
+            done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, wish, q, low, high, rows[0], bounds)
             iterations += done
             if done > 0 and (plan.kind != POSE or closure < CLOSED):
                 return iterations, True

@@ -97,13 +97,20 @@ class Stride:
     def _swing_plan(self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float], dt: float) -> Plan:
         foot = 1 - self.side
         stance_yaw = heading(self.planted_rot[self.side])
-        place, turn, clipped = self.landing.clip(foot, *footing.landing(foot))
+        place, turn, clipped = self.landing.clip(foot, *self._landing_wish(swing, footing))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
         kind = _KINDS[swing.phase]
         return Plan(*offset, position, rotation, kind, swing.min_height, down, clipped and self.mode.landing)
+
+    def _landing_wish(self, swing: Swing, footing: Footing) -> tuple[Array, float]:
+        """Where the person's foot is; more and more the middle of the landing set when it cannot get down there."""
+        (place, turn), late = footing.landing(1 - self.side), swing.lateness
+        if late == 0.0:
+            return place, turn
+        return place + late * (self.landing.middle(1 - self.side) - place), (1.0 - late) * turn
 
     def accept(self, plan: Plan, scale: float) -> None:
         """``scale`` of the way to the plan was taken."""

@@ -64,6 +64,8 @@ class SwingSettings:
     """[m/s] by which the distance that is near enough grows from then on."""
     hover: float = 0.12
     """[s] over the landing place before the foot goes down: what sways comes to rest."""
+    blocked: float = 0.2
+    """[s] of refused steps after which a foot that comes down goes up again."""
     settled: float = 0.02
     """[m/s] below which a foot over its landing place goes down."""
     arrived: float = 0.001
@@ -82,17 +84,21 @@ class Swing:
         self.min_height = 0.0
         self._velocity, self._turning = np.zeros(3), 0.0
         self._waited, self._hovered = 0.0, 0.0
+        self._blocked, self._refused = 0.0, False
         self._before = position.copy()
         self._start = position.copy()
         self._rotation = rotation.copy()
 
-    def step(self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float) -> tuple[Array, Array, bool]:
+    def step(
+        self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float
+    ) -> tuple[Array, Array, bool]:
         """The sole pose to ask for next.
 
         position, rotation: the sole as it is. goal (2,) m, goal_yaw rad: where it is to land, used once ``landing``.
         Returns position (3,), rotation (3, 3), and whether it has touched down.
         """
         moved, self._before = position - self._before, position.copy()
+        self._blocked, self._refused = self._blocked + dt if self._refused else 0.0, False
         if self.phase is Phase.LIFT:
             return self._lift(position, dt)
         if not landing:
@@ -100,14 +106,20 @@ class Swing:
             self.min_height = min(self.settings.clearance, self.min_height + self.settings.lift_speed * dt)
             self._velocity, self._turning, self._waited = moved / dt, 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
-        if self.phase is Phase.DESCEND:
+        if self.phase is Phase.DESCEND and self._blocked < self.settings.blocked:
             return self._descend(position, rotation, dt)
         return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
     def stop(self) -> None:
         """The last step was not taken: start again from rest."""
         self._velocity[:] = 0.0
-        self._turning = 0.0
+        self._turning, self._refused = 0.0, True
+
+    @property
+    def lateness(self) -> float:
+        """0 to 1: how much a foot that cannot get down where it should has to give up its place."""
+        late = self._waited / self.settings.patience - 1.0
+        return min(max(late, 0.0), 1.0)
 
     def _lift(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
         speed = min(self._velocity[2] + self.settings.lift_acceleration * dt, self.settings.lift_speed)
@@ -117,7 +129,9 @@ class Swing:
             self.phase, self.min_height = Phase.FREE, self.settings.lift_height * 0.9
         return np.array([self._start[0], self._start[1], height]), self._rotation, False
 
-    def _approach(self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float) -> tuple[Array, Array, bool]:
+    def _approach(
+        self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float
+    ) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
         self.min_height = min(self.settings.clearance - OVERHEAD, self.min_height + self.settings.lift_speed * dt)
         target = np.array([goal[0], goal[1], self.settings.clearance])
@@ -150,7 +164,10 @@ class Swing:
         if distance == 0.0:
             return way
         half = 0.5 * self.settings.approach_acceleration * dt
-        speed = min(math.sqrt(half * half + 2.0 * self.settings.approach_acceleration * distance) - half, self.settings.approach_speed)
+        speed = min(
+            math.sqrt(half * half + 2.0 * self.settings.approach_acceleration * distance) - half,
+            self.settings.approach_speed,
+        )
         change = speed * way / distance - self._velocity
         length = float(np.linalg.norm(change))
         if length > self.settings.approach_acceleration * dt:

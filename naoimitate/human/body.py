@@ -83,7 +83,9 @@ def measure(tpose: HumanFrame) -> Body:
         raise CalibrationError(f"the T-pose lacks {', '.join(missing)}: choose another moment with --tpose-at")
 
     def length(*rows: int) -> float:
-        return float(sum(np.linalg.norm(tpose.landmarks[b] - tpose.landmarks[a]) for a, b in zip(rows, rows[1:], strict=False)))
+        return float(
+            sum(np.linalg.norm(tpose.landmarks[b] - tpose.landmarks[a]) for a, b in zip(rows, rows[1:], strict=False))
+        )
 
     arms = [length(_SHOULDERS[i], _ELBOWS[i], _WRISTS[i]) for i in (0, 1)]
     legs = [length(_HIPS[i], _KNEES[i], _ANKLES[i]) for i in (0, 1)]
@@ -106,7 +108,13 @@ def observe(body: Body, frame: HumanFrame) -> BodyState:
     plane below the ankle joint, which turns with the foot. Feet without an orientation get one from ankle, toe and knee.
     """
     state = BodyState(
-        np.empty((4, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((2, 3))
+        np.empty((4, 3)),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty((2, 3)),
+        np.empty((2, 3, 3)),
+        np.empty((2, 3)),
+        np.empty((2, 3)),
     )
     p = np.ascontiguousarray(frame.landmarks, dtype=np.float64)
     for side in (0, 1):
@@ -115,7 +123,17 @@ def observe(body: Body, frame: HumanFrame) -> BodyState:
             state.feet[side] = given
         else:
             _foot_frame(p[_ANKLES[side]], p[_TOES[side]], p[_KNEES[side]], body.toe_pitch[side], state.feet[side])
-    _observe(p, body.ankle_height, state.posture, state.torso, state.mid_hip, state.soles, state.feet, state.foot_centres, state.elbows)
+    _observe(
+        p,
+        body.ankle_height,
+        state.posture,
+        state.torso,
+        state.mid_hip,
+        state.soles,
+        state.feet,
+        state.foot_centres,
+        state.elbows,
+    )
     return state
 
 
@@ -159,7 +177,15 @@ def _foot_frame(ankle: Array, toe: Array, knee: Array, toe_pitch: float, out: Ar
 
 @njit(cache=True)
 def _observe(
-    p: Array, ankle_height: float, posture: Array, torso: Array, mid_hip: Array, soles: Array, feet: Array, centres: Array, elbows: Array
+    p: Array,
+    ankle_height: float,
+    posture: Array,
+    torso: Array,
+    mid_hip: Array,
+    soles: Array,
+    feet: Array,
+    centres: Array,
+    elbows: Array,
 ) -> None:
     torso_frame(p, torso)
     mid_hip[:] = 0.5 * (p[_L_HIP] + p[_R_HIP])

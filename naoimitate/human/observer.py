@@ -38,10 +38,10 @@ class Observation:
 
 
 class Observer:
-    """Watches one person, whose measures are known."""
+    """Watches one person, whose measures are known; hands: whether the orientation of the hands is asked for."""
 
-    def __init__(self, body: Body, tpose: HumanFrame) -> None:
-        self._body = body
+    def __init__(self, body: Body, tpose: HumanFrame, hands: bool = False) -> None:
+        self._body, self._hands_wanted = body, hands
         self._last = tpose.landmarks.copy()
         self._estimator = SupportEstimator()
         self._head_zero = (0.0, 0.0)
@@ -63,7 +63,7 @@ class Observer:
             support or frame.support or self._estimator.update(frame),
             com,
             (head[0] - self._head_zero[0], head[1] - self._head_zero[1]),
-            self._hands(frame, state.torso),
+            self._hands(frame, state.torso) if self._hands_wanted else None,
             opening,
             complete,
         )
