@@ -1,0 +1,1 @@
+"""Calibration: the T-pose of a person, subject files."""

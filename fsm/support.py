@@ -10,7 +10,7 @@ import enum
 from dataclasses import dataclass
 
 OFFSET_REACHED = 0.01
-"""The normalised offset counts as 0 or 1 within this distance (design: section 4.3)."""
+"""The normalised offset counts as 0 or 1 within this distance."""
 
 
 class Mode(enum.Enum):

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from naoimitate.balance.legs import table_bounds
 from naoimitate.balance.clearance import Clearance
+from naoimitate.balance.legs import table_bounds
 from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.pose import Pose
 from naoimitate.balance.retarget import Reach

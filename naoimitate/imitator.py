@@ -143,7 +143,7 @@ class Imitator:
         return answer.given_up | self._missed(answer.pose, seen, targets, footing), arm_iterations + answer.iterations
 
     def _reach(self, pose: Pose, dt: float) -> Reach:
-        """The joint angles that a frame of dt s allows after a pose: by speed, and by acceleration with room to brake."""
+        """The joint angles that a frame of dt s allows after a pose: by speed, by acceleration with room to stop."""
         limits = self.settings.limits
         turn = self.robot.speed * (limits.joint_share * dt)
         low, high = pose.q - turn, pose.q + turn

@@ -75,7 +75,7 @@ class Follower:
 
 @njit(cache=True)
 def limited_step(p: Array, v: Array, target: Array, dt: float, max_speed: float, max_acceleration: float) -> Array:
-    """Where points p (K, 3) m with velocities v (K, 3) m/s may be asked to be dt s later on their way to targets (K, 3).
+    """Where points p (K, 3) m, moving at v (K, 3) m/s, may be asked to be dt s later on the way to targets (K, 3) m.
 
     Asked from where the points really are, so that nothing jumps when what held them back lets go.
     """

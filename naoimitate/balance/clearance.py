@@ -1,4 +1,4 @@
-"""Distances of the body to itself and to the floor as linear rows for the solvers (design: section 4.8)."""
+"""Distances of the body to itself and to the floor as linear rows for the solvers."""
 
 from __future__ import annotations
 
@@ -140,8 +140,9 @@ def _contact_points(
 
 @njit(cache=True)
 def _limb_rows(
-    tree: Tree, joints: Ints, pairs: Ints, shapes: ShapeArrays, d: Array, a: Array, b: Array, normal: Array, lowest: Array,
-    not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float, push: float,
+    tree: Tree, joints: Ints, pairs: Ints, shapes: ShapeArrays, d: Array, a: Array, b: Array, normal: Array,
+    lowest: Array, not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float,
+    push: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     n, J = joints.shape[0], np.empty((3, tree.parent.shape[0]))
     link, most = shapes.link, pairs.shape[0] + lowest.shape[0] + MOST_CORNERS
@@ -181,7 +182,8 @@ def _keep(rows: Array, bounds: Array, count: int, bound: float) -> int:
 @njit(cache=True)
 def _leg_rows(
     tree: Tree, legs: Legs, side: int, pairs: Ints, shapes: ShapeArrays, d: Array, a: Array, b: Array, normal: Array,
-    lowest: Array, not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float, push: float,
+    lowest: Array, not_foot: Array, pos: Array, rot: Array, base_pos: Array, base_rot: Array, safe: float, reach: float,
+    push: float,
 ) -> tuple[Array, Array]:  # fmt: skip
     n, J = legs.joints.shape[0], np.empty((3, tree.parent.shape[0]))
     link, most = shapes.link, pairs.shape[0] + lowest.shape[0] + MOST_CORNERS

@@ -1,4 +1,4 @@
-"""The landing set: where a foot may be set down so that the CoM can come over either foot (design: section 4.6)."""
+"""The landing set: where a foot may be set down so that the CoM can come over either foot."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class LandingSet:
     """Relative sole poses, one convex polygon of positions for each yaw of a grid.
 
     yaws: (Y,) rad, increasing, Y >= 2: heading of the swing sole in the stance sole's frame.
-    directions: (K, 2) outward unit normals. reach: (Y, K) m: position p is inside at yaw y when directions @ p <= reach.
+    directions: (K, 2) outward unit normals. reach: (Y, K) m: p is inside at a yaw when directions @ p <= reach.
     Given for the LEFT sole relative to the RIGHT one (frames: origin under the ankle); the other side is its mirror.
     """
 

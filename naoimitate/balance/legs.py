@@ -103,8 +103,8 @@ class LegLimits:
     """Reserves kept inside the robot's own limits."""
 
     knee_min: float = 0.30
-    """[rad]. Below 0.15 the torso loses one of its five free directions with both soles planted; from there to 0.3 a lift
-    of millimetres still takes radians a second of the knee. It costs 1.7 mm of leg length."""
+    """[rad]. Below 0.15 the torso loses one of its five free directions with both soles planted; up to 0.3 a lift of
+    millimetres still takes radians a second of the knee. It costs 1.7 mm of leg length."""
     torque_share: float = 0.7
     """Share of a knee's effort that the weight of the body may take: on one foot a deep bend is more than it holds."""
     range_reserve: float = 0.002
@@ -114,7 +114,7 @@ class LegLimits:
 def build_legs(robot: RobotModel, limits: LegLimits) -> Legs:
     """Flatten a robot's legs."""
     variable = np.full(len(robot.joint_names), -1, dtype=np.int64)
-    leader = {f: l for l, f in robot.coupled}
+    leader = {follower: leader for leader, follower in robot.coupled}
     chain = [*robot.chains["l_leg"], *robot.chains["r_leg"]]
     joints = [j for j in chain if j not in leader]
     for index, j in enumerate(joints):
@@ -179,8 +179,8 @@ class Stance(NamedTuple):
 class LegGoal(NamedTuple):
     """feet: (2, 3) m, hip to sole in the torso frame, (5). com: (2,) m, world. foot_weight: (2,).
 
-    turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes; move_low, move_high:
-    (3,) m, of its origin's way, along them. The torso is the heaviest body: what jerks it tips the stance foot.
+    turn_low, turn_high: (3,) rad, bounds of the torso's rotation in this frame, about its own axes; move_low and
+    move_high: (3,) m, of its origin's way, along them. The torso is heavy: what jerks it tips the stance foot.
     lever: (2,) m, how far the CoM's plumb line may pass from each knee.
     """
 

@@ -105,7 +105,7 @@ class Planted:
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
     def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
-        """Move the legs of q (J,) to ``scale`` of the plan; (iterations, whether the other sole is where it was asked to be)."""
+        """Move the legs of q (J,) to ``scale`` of the plan; (iterations, whether the other sole is in place)."""
         stride, other = self._stride, 1 - self._stride.side
         pos, rot = stride.planted_pos.copy(), stride.planted_rot.copy()
         pos[other], rot[other] = plan.sole_pos, plan.sole_rot

@@ -10,7 +10,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 LEVEL_BELOW = 0.030
-"""[m] off the floor below which a swing sole is levelled more and more (design: section 4.6)."""
+"""[m] off the floor below which a swing sole is levelled more and more."""
 
 
 def offset_in_space(left: Array, right: Array, com: Array) -> float:

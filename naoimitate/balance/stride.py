@@ -129,7 +129,7 @@ class Stride:
             self._swing.stop()
 
     def com_goal(self, offset: float) -> Array:
-        """Where the CoM's projection belongs, (2,) m: p_L + o (p_R - p_L), with the feet where they stand or last stood."""
+        """Where the CoM's projection belongs, (2,) m: p_L + o (p_R - p_L), on the feet as they stand or last stood."""
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         return np.asarray((left + offset * (right - left))[:2])
 

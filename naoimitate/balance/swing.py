@@ -1,4 +1,4 @@
-"""The swing foot's way: straight up off the floor, free, over its landing place, straight down (design: section 4.6)."""
+"""The swing foot's way: straight up off the floor, free, over its landing place, straight down."""
 
 from __future__ import annotations
 

@@ -156,9 +156,10 @@ class RobotCommand:
 
     time: s on the robot's clock. q: (J,) rad in the model's joint order. base_pos (3,) m and base_quat (4,)
     (w, x, y, z): torso link in the world, floor at z = 0. support: ``D``, ``L``, ``R``: the feet that carry.
-    offset: the robot's normalised CoM offset, 0 left to 1 right. com: (3,) m, world. soles: (2, 3) m, left and right. posture: (4, 3) m, the person's
-    posture (1) for l_hand, l_foot, r_hand, r_foot; human_support and human_offset likewise. hand_opening: (2,).
-    given_up: what similarity was sacrificed for. ik_iterations: count over all limbs.
+    offset: the robot's normalised CoM offset, 0 left to 1 right. com: (3,) m, world. soles: (2, 3) m, left and right,
+    world. posture: (4, 3) m, the person's posture (1) for l_hand, l_foot, r_hand, r_foot; human_support and
+    human_offset likewise. hand_opening: (2,). given_up: what similarity was sacrificed for. ik_iterations: count over
+    all limbs.
     """
 
     time: float

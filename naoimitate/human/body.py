@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -39,7 +40,7 @@ class Body:
     """A person's measures, from the T-pose.
 
     arm: (2,) m, shoulder-elbow plus elbow-wrist; leg: (2,) m, hip-knee plus knee-ankle plus ankle-sole; left, right.
-    ankle_height: m, ankle joint above the sole. toe_pitch: (2,) rad, slope of the ankle-toe line below the sole's plane.
+    ankle_height: m, ankle joint above the sole. toe_pitch: (2,) rad, slope of the ankle-toe line below the sole.
     stature: m.
     """
 
@@ -83,9 +84,7 @@ def measure(tpose: HumanFrame) -> Body:
         raise CalibrationError(f"the T-pose lacks {', '.join(missing)}: choose another moment with --tpose-at")
 
     def length(*rows: int) -> float:
-        return float(
-            sum(np.linalg.norm(tpose.landmarks[b] - tpose.landmarks[a]) for a, b in zip(rows, rows[1:], strict=False))
-        )
+        return float(sum(np.linalg.norm(tpose.landmarks[b] - tpose.landmarks[a]) for a, b in itertools.pairwise(rows)))
 
     arms = [length(_SHOULDERS[i], _ELBOWS[i], _WRISTS[i]) for i in (0, 1)]
     legs = [length(_HIPS[i], _KNEES[i], _ANKLES[i]) for i in (0, 1)]
@@ -105,7 +104,7 @@ def observe(body: Body, frame: HumanFrame) -> BodyState:
     """Equation (1) and its frames for one moment; every needed landmark must be finite.
 
     f = [p_LHand^LShoulder, p_LFoot^LHip, p_RHand^RShoulder, p_RFoot^RHip]. Hand: the wrist. Foot: the point of the sole
-    plane below the ankle joint, which turns with the foot. Feet without an orientation get one from ankle, toe and knee.
+    plane below the ankle joint, which turns with the foot. Feet without an orientation get one from ankle, toe, knee.
     """
     state = BodyState(
         np.empty((4, 3)),

@@ -13,7 +13,7 @@ BUILTIN = "builtin:"
 PAPER = "builtin:paper"
 NOT_QUASI_STATIC_BUILTINS = ("walk",)
 QUASI_STATIC_CLIPS = ("13_29", "141_16", "mass_balance", "88_03")
-"""Beginnings of file names of the recorded clips that a robot can follow without dynamics (design section 7)."""
+"""Beginnings of file names of the recorded clips that a robot can follow without dynamics."""
 CLOCK_TOLERANCE = 1e-6
 """Rounding of the clocks when a run's speed is read off them, s."""
 
@@ -24,7 +24,7 @@ def is_builtin(run: Run) -> bool:
 
 
 def is_quasi_static(run: Run) -> bool:
-    """Whether the clip is one of those that design section 7 calls quasi-static."""
+    """Whether the clip is one of those that count as quasi-static."""
     if is_builtin(run):
         return run.source.removeprefix(BUILTIN) not in NOT_QUASI_STATIC_BUILTINS
     return PurePath(run.source).name.startswith(QUASI_STATIC_CLIPS)

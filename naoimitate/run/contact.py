@@ -13,9 +13,9 @@ from naoimitate.run.measure import Bar, Measure
 from naoimitate.run.replay import LOADED, Array, Replay
 
 CLEAR = 0.005
-"""Height of a sole over the floor from which it is clear of it, m (design section 7)."""
+"""Height of a sole over the floor from which it is clear of it, m."""
 SWING_ENDS = 0.15
-"""At the start and the end of its swing a foot may be lower than ``CLEAR``, s (design section 7)."""
+"""At the start and the end of its swing a foot may be lower than ``CLEAR``, s."""
 MM = 1000.0
 DIRECTIONS = 36
 """Directions in which the extent of a slipping point's track is measured: its diameter to 0.1 %."""

@@ -11,11 +11,11 @@ from naoimitate.run.measure import Bar, Measure
 from naoimitate.run.replay import Array
 
 COUPLED_TOLERANCE = 1e-6
-"""Joints of one motor may differ by this much, rad (design section 7)."""
+"""Joints of one motor may differ by this much, rad."""
 RANGE_TOLERANCE = 1e-9
 """Rounding of a joint at its limit, rad; less is no excess."""
 SPEED_FRACTION = 0.9
-"""Largest joint speed as a fraction of the motor's no-load speed (design section 7)."""
+"""Largest joint speed as a fraction of the motor's no-load speed."""
 
 RATTLE_SPEED = 1.0
 """A joint that moves faster than this both before and after it turns round rattles, rad/s: people's joints do not."""

@@ -25,7 +25,7 @@ class Bar:
 
 @dataclass(frozen=True)
 class Measure:
-    """A measure of design section 7.
+    """A measure of docs/scores.md.
 
     key: name in JSON. label, unit: for people. value: None where the run has nothing to measure. bar: None where the
     value is only reported. applies: the bar holds for this run. note: why not, or what the value means.

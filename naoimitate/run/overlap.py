@@ -12,7 +12,7 @@ from naoimitate.run.measure import Bar, Measure
 from naoimitate.run.replay import Array, Replay
 
 ALLOWED_OVERLAP = 0.001
-"""Two shapes may overlap by this much, m (design section 7)."""
+"""Two shapes may overlap by this much, m."""
 
 
 def nearest_pairs(robot: RobotModel, frames: Replay) -> Array:

@@ -1,8 +1,8 @@
-"""The time law of a recorded motion: which moment of the person the robot imitates next (design: section 4.11).
+"""The time law of a recorded motion: which moment of the person the robot imitates next.
 
 ``auto`` plays the person at full speed and waits only where the robot needs time: in the double support before a
 lift-off, until the robot's CoM is over the stance foot; right after a touchdown, until the robot's foot is down; and it
-slows where hands or the swing foot fall behind at their speed limits. It never stops while the person stands on one foot.
+slows where hands or the swing foot fall behind at their speed limits. It never stops while they stand on one foot.
 """
 
 from __future__ import annotations

@@ -94,7 +94,8 @@ def _stretch(motion: Motion, start: float | None, end: float | None) -> Motion:
     keep = (motion.time >= (-np.inf if start is None else start)) & (motion.time <= (np.inf if end is None else end))
     if not keep.any():
         raise MotionFormatError(
-            f"no frame between --start and --end: {motion.name} lasts from {motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
+            f"no frame between --start and --end: {motion.name} lasts from "
+            f"{motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
         )
     if keep.all():
         return motion

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from naoimitate.core.frames import Array, Motion
-from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.contact import sole_tilt
 from naoimitate.run.file import Run
 from naoimitate.run.recorded import imitate
-from naoimitate.run.replay import Replay, frames
+from naoimitate.run.replay import frames
 from naoimitate.run.similarity import FEET, HANDS, errors, hand_excess
 from naoimitate.run.stability import margins_at_frames
 from naoimitate.settings import PAPER, Settings

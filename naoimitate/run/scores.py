@@ -1,4 +1,4 @@
-"""The score sheet of a run: every measure of design section 7, from the run file and the robot's model alone."""
+"""The score sheet of a run: every measure of docs/scores.md, from the run file and the robot's model alone."""
 
 from __future__ import annotations
 

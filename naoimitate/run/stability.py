@@ -9,9 +9,9 @@ from naoimitate.run.measure import Bar, Measure
 from naoimitate.run.replay import Array, Replay
 
 MIN_MARGIN = 5.0
-"""Smallest allowed distance of the centre of mass to the edge of the support polygon, mm (design section 7)."""
+"""Smallest allowed distance of the centre of mass to the edge of the support polygon, mm."""
 PLANNED_MARGIN = 25.0
-"""Distance planned for in single support, mm (design section 4.7: soft servos tip below 16 mm sideways)."""
+"""Distance planned for in single support, mm."""
 MM = 1000.0
 
 

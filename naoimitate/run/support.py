@@ -14,7 +14,7 @@ from naoimitate.run.measure import Bar, Measure
 from naoimitate.run.replay import Array
 
 SHORT_PHASE = 0.5
-"""A single support of the person counts for recall from this length, s of human time (design section 7)."""
+"""A single support of the person counts for recall from this length, s of human time."""
 LONG_PHASE = 1.5
 """The same for the bar at speed 1, s: shorter stands end before a robot's centre of mass can follow."""
 TIME_TOLERANCE = 1e-6

@@ -9,9 +9,9 @@ from naoimitate.run.file import Run
 from naoimitate.run.measure import Bar, Measure
 
 MAX_TILT = np.radians(45.0)
-"""Largest angle of the torso's up-axis from its planned direction, rad (design section 7)."""
+"""Largest angle of the torso's up-axis from its planned direction, rad."""
 MIN_HEIGHT = 0.6
-"""Smallest height of the torso as a fraction of the planned one (design section 7)."""
+"""Smallest height of the torso as a fraction of the planned one."""
 MS = 1000.0
 
 
