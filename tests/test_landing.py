@@ -86,6 +86,14 @@ def test_the_standing_posture_is_a_landing_place(robot: RobotModel) -> None:
     assert prover.both_feet(middle, 0.0)
 
 
+@pytest.mark.parametrize("swing", [0, 1])
+def test_the_middle_is_well_inside(robot: RobotModel, swing: int) -> None:
+    places = landing_set(robot)
+    middle = places.middle(swing)
+    assert violation(places, swing, middle, 0.0) < -0.01
+    assert Prover(robot).both_feet(middle * [1.0, 1.0 if swing == 0 else -1.0], 0.0)
+
+
 def test_the_set_is_wide_enough_to_walk(robot: RobotModel) -> None:
     """At least 4 cm forwards and backwards, some of it with the feet turned by 0.2 rad."""
     places = landing_set(robot)

@@ -14,7 +14,7 @@ from naoimitate.core.geometry import matrix_from_rotation_vector, rotation_vecto
 
 S = SwingSettings()
 CLEAR = 0.005
-"""m from which a foot counts as clear of the floor, and s within which it must get there (design section 7)."""
+"""m from which a foot counts as clear of the floor, and s within which it must get there."""
 ENDS = 0.15
 START = np.array([0.1, 0.05, 0.0])
 GOAL = np.array([0.16, 0.07])
@@ -194,3 +194,22 @@ def test_a_refused_step_starts_again_from_rest() -> None:
     before = foot.position[2]
     foot.step(False)
     assert foot.position[2] - before <= S.lift_acceleration * foot.dt**2 + 1e-12
+
+
+def test_a_foot_that_is_refused_on_its_way_down_goes_up_again_and_gives_way() -> None:
+    """Something is in the way under the landing place: every step down is refused."""
+    foot = Foot(0.02)
+    foot.until(False, Phase.FREE)
+    foot.until(True, Phase.DESCEND)
+    assert foot.swing.lateness == 0.0
+    held, phases = foot.position, set()
+    for _ in range(300):
+        _, _, foot.down = foot.swing.step(held, foot.rotation, GOAL, -0.2, True, foot.dt)
+        if foot.swing.phase is Phase.DESCEND:
+            foot.swing.stop()
+        phases.add(foot.swing.phase)
+        assert not foot.down
+    assert phases == {Phase.DESCEND, Phase.APPROACH}
+    assert foot.swing.lateness == 1.0
+    foot.step(False)
+    assert foot.swing.lateness == 0.0

@@ -106,8 +106,10 @@ class Swing:
             self.min_height = min(self.settings.clearance, self.min_height + self.settings.lift_speed * dt)
             self._velocity, self._turning, self._waited = moved / dt, 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
-        if self.phase is Phase.DESCEND and self._blocked < self.settings.blocked:
-            return self._descend(position, rotation, dt)
+        if self.phase is Phase.DESCEND:
+            if self._blocked < self.settings.blocked:
+                return self._descend(position, rotation, dt)
+            self._blocked, self._hovered = 0.0, 0.0
         return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
     def stop(self) -> None:
