@@ -107,6 +107,7 @@ class Swing:
             self._velocity, self._turning, self._waited = moved / dt, 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
         if self.phase is Phase.DESCEND:
+            self._waited += dt if self._blocked > 0.0 else 0.0
             if self._blocked < self.settings.blocked:
                 return self._descend(position, rotation, dt)
             self._blocked, self._hovered = 0.0, 0.0
