@@ -142,7 +142,8 @@ class Style:
 
 
 def rest_turns(rest: str) -> dict[str, Rotation]:
-    """How the segments are turned in a rest pose: ``t``, ``a`` (arms 45 deg down), ``hanging``, ``spread`` (legs), ``x``."""
+    """How the segments are turned in a rest pose: ``t``, ``a`` (arms 45 deg down), ``hanging``, ``spread`` legs, or all
+    bones along ``x``."""
     turns = {slot.segment: Rotation.identity() for slot in slots().values() if slot.segment}
     for side, sign in SIGN.items():
         arm = {"a": -45.0, "hanging": -88.0}.get(rest, 0.0)
@@ -195,7 +196,7 @@ def bvh(motion: Motion, style: Style, step: int = 1, added: bool = False) -> str
         turns = {name: Rotation.concatenate([Rotation.identity(), turn]) for name, turn in turns.items()}
         root = np.concatenate([[[0.3, -0.2, BODY.leg]], root])
     rest = rest_turns(style.rest)
-    M = Rotation.from_matrix(style.axes)
+    M = Rotation.from_matrix(style.axes * np.linalg.det(style.axes))  # a mirror image turns like its negative
     world = {slot: M * turns[part.segment] * rest[part.segment].inv() * M.inv() for slot, part in tree.items()}
     rows = [root @ style.axes.T / style.unit]
     for slot in _depth_first(tree):
@@ -250,7 +251,8 @@ def _node(tree: dict[str, Slot], slot: str, rest: dict[str, Rotation], style: St
     kind, children = ("ROOT" if not part.above else "JOINT"), [c for c, p in tree.items() if p.above == slot]
     place = " Xposition Yposition Zposition" if not part.above or style.six_channels else ""
     channels = place + "".join(f" {axis}rotation" for axis in style.order)
-    text = f"{indent}{kind} {style.names[slot]}\n{indent}{{\n{indent}\tOFFSET {_numbers(_offset(tree, slot, rest, style))}\n"
+    offset = _numbers(_offset(tree, slot, rest, style))
+    text = f"{indent}{kind} {style.names[slot]}\n{indent}{{\n{indent}\tOFFSET {offset}\n"
     text += f"{indent}\tCHANNELS {len(channels.split())}{channels}\n"
     text += "".join(_node(tree, child, rest, style, indent + "\t") for child in children)
     if not children:
@@ -261,12 +263,8 @@ def _node(tree: dict[str, Slot], slot: str, rest: dict[str, Rotation], style: St
 
 def _end(slot: str) -> np.ndarray:
     """Where the bone of a last joint ends: the next slot, or a little further on for toes and knuckles."""
-    nexts = {
-        "head": "head_end",
-        **{f"{s}_wrist": f"{s}_knuckle" for s in SIDES},
-        **{f"{s}_ankle": f"{s}_toe" for s in SIDES},
-    }
-    nexts |= {f"{s}_knee": f"{s}_ankle" for s in SIDES}
+    pairs = (("wrist", "knuckle"), ("ankle", "toe"), ("knee", "ankle"), ("elbow", "wrist"))
+    nexts = {"head": "head_end", **{f"{s}_{a}": f"{s}_{b}" for s in SIDES for a, b in pairs}}
     if slot in nexts:
         return slots()[nexts[slot]].place
     return np.array([0.05, 0.0, 0.0]) if slot.endswith("toe") else np.array([0.0, SIGN.get(slot[0], 0.0) * 0.03, 0.0])

@@ -44,7 +44,8 @@ def load_motion(
         wishes = {"fps": fps, "unit": unit, "up": up, "skeleton": skeleton}
         motion = _builtin(name.removeprefix(BUILTIN), [key for key, wish in wishes.items() if wish is not None])
     else:
-        from naoimitate.motion.load import Options, load_file
+        from naoimitate.motion.load import load_file
+        from naoimitate.motion.scene import Options
 
         chosen = None if skeleton is None else Path(skeleton)
         motion = load_file(Path(name), Options(fps, unit, up, chosen, tpose_at))

@@ -7,6 +7,8 @@ its rotation against its parent is C M C^-1, and its child starts at its end.
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Array
 from naoimitate.motion.clip import Clip, Skeleton, forward
-from naoimitate.motion.text import decode
+from naoimitate.motion.text import damaged, decode
 
 INCH = 0.0254
 """m; ASF lengths are inches times the header's ``length``."""
@@ -166,16 +168,22 @@ def _parse_amc(text: str) -> tuple[list[dict[str, list[float]]], list[str]]:
             except ValueError:
                 frames[-1][words[0]] = []
     notes = []
-    shape = {name: len(values) for name, values in frames[0].items()} if frames else {}
+    shape = _usual_shape(frames)
     if frames and not _complete(frames[-1], shape):
         frames.pop()
         notes.append("The last frame is cut off and was dropped.")
     if not frames or "root" not in shape:
         raise MotionFormatError("the AMC file has no complete frame of motion: get the complete file")
-    for i, frame in enumerate(frames):
-        if not _complete(frame, shape):
-            raise MotionFormatError(f"frame {i + 1} of the AMC file is damaged: get the complete file")
-    return frames, notes
+    bad = [i for i, frame in enumerate(frames) if not _complete(frame, shape)]
+    for i in bad:
+        frames[i] = {name: [math.nan] * n for name, n in shape.items()}
+    return frames, notes + damaged(len(bad), len(frames))
+
+
+def _usual_shape(frames: list[dict[str, list[float]]]) -> dict[str, int]:
+    """How many numbers each bone has, in most of the first frames."""
+    shapes = Counter(tuple((name, len(values)) for name, values in frame.items()) for frame in frames[:9])
+    return dict(shapes.most_common(1)[0][0]) if shapes else {}
 
 
 def _complete(frame: dict[str, list[float]], shape: dict[str, int]) -> bool:
@@ -184,7 +192,7 @@ def _complete(frame: dict[str, list[float]], shape: dict[str, int]) -> bool:
 
 def _channels(asf: _Asf, frames: list[dict[str, list[float]]], names: list[str], degrees: bool) -> tuple[Array, Array]:
     """Root positions (T, 3) and rotations of the nodes against their parents (T, J, 3, 3)."""
-    table = {name: np.array([frame[name] for frame in frames]) for name in frames[0]}
+    table = {name: np.array([frame[name] for frame in frames]) for name in _usual_shape(frames)}
     local = np.tile(np.eye(3), (len(frames), len(names), 1, 1))
     root = _padded(table["root"], 6)
     local[:, 0] = _turns("XYZ", root[:, 3:6], degrees)

@@ -77,6 +77,8 @@ def _split(text: str) -> tuple[_Header, str]:
     channels = [tuple(m.group(1).split()) for m in _CHANNELS.finditer(head)]
     if not channels or sum(map(len, channels)) > MAX_CHANNELS:
         raise MotionFormatError("the BVH file has no readable hierarchy of joints: export it again")
+    if len(re.findall(r"^[ \t]*ROOT\b", head, re.MULTILINE)) > 1:
+        raise MotionFormatError("the BVH file has more than one skeleton: export one person a file")
     declared = _FRAMES.search(head)
     frames = int(declared.group(1)) if declared else None
     return _Header(head, channels, frames, _rate(found.group(1))), text[found.end() :]
@@ -99,7 +101,7 @@ def _order(channels: tuple[str, ...]) -> str:
     turns = [c[0].upper() for c in channels if c.lower().endswith("rotation")]
     known = all(re.fullmatch(r"[XYZ](rotation|position)", c, re.IGNORECASE) for c in channels)
     if not known or len(set(turns)) != len(turns):
-        raise MotionFormatError(f"the BVH file has the unknown channels {' '.join(channels)[:60]}: export Euler angles")
+        raise MotionFormatError("the BVH file has channels that are no positions and Euler angles: export it again")
     return "".join(turns + [axis for axis in "XYZ" if axis not in turns])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +38,8 @@ HUMANOID3D: tuple[Joint, ...] = (
 """The joints of data/characters/humanoid3d.txt of DeepMimic (Peng et al. 2018)."""
 NUMBERS = {"none": 7, "spherical": 4, "revolute": 1, "fixed": 0}
 """How many numbers a frame has for a joint of each type; the root's are its position and quaternion."""
+CHILDREN = ("spherical", "revolute", "fixed")
+"""Types of joints below the root."""
 
 
 def read_deepmimic(path: Path, data: bytes, skeleton: Path | None) -> Clip:
@@ -44,17 +47,15 @@ def read_deepmimic(path: Path, data: bytes, skeleton: Path | None) -> Clip:
 
     Raises MotionFormatError when it is damaged or does not fit the skeleton.
     """
-    frames = _frames(decode(data))
+    frames, notes = _frames(decode(data))
     joints, note = _joints(path, skeleton)
     width = 1 + sum(NUMBERS[j[2]] for j in joints)
     if any(not isinstance(f, list) or len(f) != width for f in frames):
         raise MotionFormatError(f"the frames do not have the {width} numbers of the skeleton: name it with --skeleton")
     try:
         table = np.array(frames, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise MotionFormatError(
-            "the frames of the DeepMimic file are not all numbers: get the complete file"
-        ) from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise MotionFormatError("the DeepMimic file has frames that are not numbers: get the complete file") from error
     nodes = Skeleton(
         names=tuple(j[0] for j in joints),
         parents=np.array([j[1] for j in joints]),
@@ -72,21 +73,30 @@ def read_deepmimic(path: Path, data: bytes, skeleton: Path | None) -> Clip:
         time=time,
         unit=1.0,
         up="y",
-        notes=() if not note else (note,),
+        notes=(*notes, note),
     )
 
 
-def _frames(text: str) -> list[Any]:
-    try:
-        content = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise MotionFormatError(
-            "the JSON of the DeepMimic file is cut off or damaged: get the complete file"
-        ) from error
+def _frames(text: str) -> tuple[list[Any], list[str]]:
+    """The frames, and a sentence when the file is cut off after some of them."""
+    content, notes = _json(text), []
+    if content is None and '"Frames"' in text:
+        ends = [m.end() for m in re.finditer(r"\]", text)][-2:]  # the last frame that is complete, or the one before
+        whole = (_json(text[:end] + "]}") for end in reversed(ends))
+        content = next((c for c in whole if c is not None), None)
+        notes = ["The file is cut off; its complete frames were read."]
     frames = content.get("Frames") if isinstance(content, dict) else None
     if not isinstance(frames, list) or not frames:
-        raise MotionFormatError("the DeepMimic file has no frames: get the complete file")
-    return frames
+        raise MotionFormatError("the DeepMimic file has no complete frame, or is damaged: get the complete file")
+    return frames, notes
+
+
+def _json(text: str) -> Any:
+    """The content of a JSON text, None when it is none."""
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None
 
 
 def _clock(durations: Array) -> tuple[float | None, Array | None]:
@@ -122,9 +132,10 @@ def _parse(path: Path) -> tuple[Joint, ...]:
         )
     except OSError as error:
         raise MotionFormatError(f"the skeleton {path} cannot be read: {error.strerror}") from error
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, OverflowError, RecursionError) as error:
         raise MotionFormatError(f"the skeleton {path.name} is not a DeepMimic character: name another") from error
-    if not joints or any(t not in NUMBERS or parent >= i for i, (_, parent, t, _) in enumerate(joints)):
+    tree = all(0 <= parent < i and kind in CHILDREN for i, (_, parent, kind, _) in enumerate(joints) if i)
+    if not joints or joints[0][1:3] != (-1, "none") or not tree:
         raise MotionFormatError(f"the skeleton {path.name} has joints of an unknown type: name another")
     return joints
 

@@ -51,8 +51,18 @@ def person(reference: Reference, head_is_joint: bool) -> Person:
     gone = {name for name, row in LANDMARK.items() if np.isnan(reference.landmarks[row]).any()}
     attached = {name: rule for name, rule in attached.items() if name in gone}
     if head_is_joint:
-        attached["head"] = ("head", "head", np.array([0.0, 0.0, HEAD_CENTRE * reference.stature]))
+        attached["head"] = ("head", "head", np.array([0.0, 0.0, _head_above_joint(reference, size)]))
     return Person(reference, attached, tuple(name for name in ("chest", "head") if name in gone))
+
+
+def _head_above_joint(reference: Reference, size: Anthropometry) -> float:
+    """Height of the head's centre over its joint, m; some skeletons have that joint down between the shoulders."""
+    joint = reference.landmarks[LANDMARK["head"], 2]
+    shoulders = 0.5 * (reference.landmarks[LANDMARK["l_shoulder"], 2] + reference.landmarks[LANDMARK["r_shoulder"], 2])
+    from_shoulders = float(shoulders + size.neck - joint)
+    return (
+        max(HEAD_CENTRE * reference.stature, from_shoulders) if joint < shoulders else HEAD_CENTRE * reference.stature
+    )
 
 
 def landmarks_of(who: Person, track: Track) -> Array:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Array
+
+MOST_DAMAGED = 0.1
+"""Share of damaged frames beyond which a file is not worth reading."""
 
 
 def decode(data: bytes) -> str:
@@ -19,9 +24,10 @@ def decode(data: bytes) -> str:
 
 
 def numbers(body: str, columns: int) -> tuple[Array, list[str]]:
-    """A table (T, columns) out of lines of numbers; an incomplete last line is dropped and said.
+    """A table (T, columns) out of lines of numbers, and sentences about damage.
 
-    Raises MotionFormatError when a line in between is damaged or no line is complete.
+    An incomplete last line is dropped; another damaged line becomes NaN.
+    Raises MotionFormatError when no line is complete, or too many are damaged.
     """
     lines = [line for line in body.split("\n") if line and not line.isspace()]
     notes: list[str] = []
@@ -34,10 +40,21 @@ def numbers(body: str, columns: int) -> tuple[Array, list[str]]:
         table = np.loadtxt(lines, ndmin=2, comments=None)
     except ValueError:
         table = np.empty((0, 0))
-    if table.shape != (len(lines), columns):
-        bad = next((i for i, line in enumerate(lines) if _row(line, columns) is None), 0)
-        raise MotionFormatError(f"frame {bad + 1} of the file does not have {columns} numbers: export it again")
-    return table, notes
+    if table.shape == (len(lines), columns):
+        return table, notes
+    rows = [_row(line, columns) for line in lines]
+    notes += damaged(rows.count(None), len(rows))
+    return np.array([[math.nan] * columns if row is None else row for row in rows]), notes
+
+
+def damaged(bad: int, frames: int) -> list[str]:
+    """A sentence about damaged frames, none when there are none.
+
+    Raises MotionFormatError when they are more than a tenth.
+    """
+    if bad > max(1, MOST_DAMAGED * frames):
+        raise MotionFormatError(f"{bad} of {frames} frames of the file are damaged: get the complete file")
+    return [f"{bad} damaged frames were taken as missing."] if bad else []
 
 
 def _row(line: str, columns: int) -> list[float] | None:

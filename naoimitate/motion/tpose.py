@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -50,6 +52,15 @@ def across(landmarks: Array) -> Array:
     total[..., 2] = 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(total / np.linalg.norm(total, axis=-1, keepdims=True))
+
+
+def heading(landmarks: Array) -> float:
+    """Yaw (rad) of the person's front in one posture (19, 3) m, z up; of somebody who lies, from hips to shoulders."""
+    left = across(landmarks)
+    if np.isfinite(left).all():
+        return math.atan2(-left[0], left[1])
+    body = landmarks[LANDMARK["l_shoulder"]] + landmarks[LANDMARK["r_shoulder"]] - 2.0 * landmarks[LANDMARK["pelvis"]]
+    return math.atan2(body[1], body[0]) if np.isfinite(body).all() else 0.0
 
 
 def is_tpose(landmarks: Array) -> npt.NDArray[np.bool_]:
