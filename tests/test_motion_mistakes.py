@@ -198,8 +198,9 @@ def test_wishes_that_do_not_fit_the_file_are_refused(tmp_path: Path) -> None:
     refused(tmp_path, text(), "--up", up="sideways")
     with pytest.raises(MotionFormatError, match="no frame lies between"):
         read(tmp_path, text(), start=100.0)
-    with pytest.raises(MotionFormatError, match="--fps is for files"):
-        load_motion("builtin:wave", fps=100.0)
+    for wish, says in (({"fps": 100.0}, "--fps"), ({"tpose_at": 1.0}, "--tpose-at")):
+        with pytest.raises(MotionFormatError, match=f"{says} is for files"):
+            load_motion("builtin:wave", **wish)
 
 
 def test_a_stretch_of_a_clip_keeps_the_times_of_the_file(tmp_path: Path) -> None:

@@ -41,7 +41,8 @@ def load_motion(
     """
     name = fspath(spec)
     if name.startswith(BUILTIN):
-        wishes = {"fps": fps, "unit": unit, "up": up, "skeleton": skeleton}
+        chosen_tpose = None if tpose_at == "auto" else tpose_at
+        wishes = {"fps": fps, "unit": unit, "up": up, "skeleton": skeleton, "tpose-at": chosen_tpose}
         motion = _builtin(name.removeprefix(BUILTIN), [key for key, wish in wishes.items() if wish is not None])
     else:
         from naoimitate.motion.load import load_file

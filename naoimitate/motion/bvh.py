@@ -134,13 +134,13 @@ def _hierarchy(header: _Header) -> Skeleton:
 def _columns(table: Array, header: _Header, skeleton: Skeleton) -> tuple[Array, Array, Skeleton]:
     """Root positions (T, 3), angles (T, N, 3) in deg in each joint's order, and the skeleton as the channels say."""
     root, angles = np.zeros((len(table), 3)), np.zeros((len(table), len(header.channels), 3))
-    offsets, column = skeleton.offsets.copy(), 0
+    offsets, orders, column = skeleton.offsets.copy(), header.orders, 0
     for i, (node, block) in enumerate(zip(np.flatnonzero(~skeleton.ends), header.channels, strict=True)):
         place = np.zeros((len(table), 3))
         for channel in block:
             axis = channel[0].upper()
             if channel.lower().endswith("rotation"):
-                angles[:, i, header.orders[i].index(axis)] = table[:, column]
+                angles[:, i, orders[i].index(axis)] = table[:, column]
             else:
                 place[:, "XYZ".index(axis)] = table[:, column]
             column += 1
