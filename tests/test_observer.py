@@ -19,7 +19,7 @@ BODY = measure(tpose())
 
 
 def observer() -> Observer:
-    return Observer(BODY, tpose())
+    return Observer(BODY, tpose(), hands=True)
 
 
 def test_a_whole_frame_is_complete_and_left_as_it_is() -> None:
@@ -133,6 +133,10 @@ def test_orientations_of_any_length_are_directions() -> None:
     frame = person(head=[0.3, 0.1])
     doubled = replace(frame, orientations=-2.0 * frame.orientations)
     assert observer().see(doubled, "D").head == pytest.approx((0.3, 0.1), abs=1e-6)
+
+
+def test_hands_are_left_alone_where_nobody_asks_for_them() -> None:
+    assert Observer(BODY, tpose()).see(tpose(), "D").hands is None
 
 
 def test_hand_opening_is_nan_where_the_source_has_none() -> None:

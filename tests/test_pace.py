@@ -80,7 +80,7 @@ def test_phases_are_end_to_end() -> None:
 
 
 @given(STEPS, st.sampled_from([0.005, 0.02, 0.05]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_auto_covers_the_clip_and_never_goes_back_or_too_fast(steps: list[tuple[str, float]], dt: float) -> None:
     clip = motion(steps)
     times = play(clip, dt=dt).times
@@ -90,7 +90,7 @@ def test_auto_covers_the_clip_and_never_goes_back_or_too_fast(steps: list[tuple[
 
 
 @given(STEPS, st.sampled_from([0.0, 0.02, 1.0]))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_auto_never_pauses_while_the_person_stands_on_one_foot(steps: list[tuple[str, float]], lag: float) -> None:
     """But for the very start of a clip, from where the person is sped up, and its last frame."""
     clip = motion([("D", 0.2), *steps])
@@ -104,7 +104,7 @@ def test_auto_never_pauses_while_the_person_stands_on_one_foot(steps: list[tuple
 
 
 @given(st.lists(st.tuples(st.sampled_from("LR"), st.floats(0.1, 1.5), st.floats(0.1, 2.0)), min_size=1, max_size=5))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_the_robot_lifts_with_the_person_however_short_the_double_support(
     stands: list[tuple[str, float, float]],
 ) -> None:
