@@ -134,6 +134,13 @@ def test_missing_landmarks_in_a_clip_are_bridged(nao: RobotModel) -> None:
     assert np.isfinite(run.human_posture).all()
 
 
+@pytest.mark.parametrize("speed", [1.0, "auto"])
+def test_support_that_nobody_told_is_found(nao: RobotModel, speed: float | str) -> None:
+    motion = replace(builtin_motion("march"), support=None, contacts=None)
+    run = imitate(motion, nao, rate=50.0, speed=speed, start=2.0, end=7.0)
+    assert "L" in run.human_support and "L" in run.support
+
+
 def test_progress_goes_from_nothing_to_one(nao: RobotModel) -> None:
     shares: list[float] = []
     imitate(builtin_motion("wave"), nao, rate=50.0, start=1.0, end=2.0, progress=shares.append)

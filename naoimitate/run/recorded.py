@@ -5,12 +5,14 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Motion, RobotCommand
+from naoimitate.human.support import annotate
 from naoimitate.imitator import Imitator
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.file import Run
@@ -18,6 +20,8 @@ from naoimitate.run.pace import AutoPace, ConstantPace
 from naoimitate.run.provenance import provenance
 from naoimitate.settings import Settings
 
+SAMPLED = ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")
+"""What a motion has a value of in every frame, times apart."""
 LONGEST = 40.0
 """A run is ended after this many times the length of the clip, plus a minute: nothing waits for ever."""
 
@@ -41,11 +45,12 @@ def imitate(
 
     speed: factor, or ``auto``: slowed where the robot needs the time. rate: Hz of the robot's commands. sample: Hz at
     which the person is seen, None for the file's own. start, end: s in the file's time. subject: who was measured
-    before; else the motion's T-pose is used. progress: called with the share of the clip that is done.
+    before; else the motion's T-pose is used. progress: called with the share of the clip that is done. A motion whose
+    support is not known is annotated first.
     Raises MotionFormatError for a motion without a T-pose or an empty stretch, CalibrationError for an unusable T-pose.
     """
     settings = settings or Settings()
-    motion = _stretch(motion, start, end)
+    motion = annotate(_stretch(motion, start, end))
     seen = motion if sample is None else resample(motion, sample)
     if subject is None:
         if motion.tpose is None:
@@ -83,11 +88,8 @@ def resample(motion: Motion, rate: float) -> Motion:
         values = [getattr(f, name) for f in frames]
         return None if values[0] is None else np.array(values)
 
-    return replace(
-        motion,
-        time=times,
-        **{k: stack(k) for k in ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")},
-    )
+    changed: dict[str, Any] = {name: stack(name) for name in SAMPLED}
+    return replace(motion, time=times, **changed)
 
 
 def _stretch(motion: Motion, start: float | None, end: float | None) -> Motion:
@@ -99,8 +101,9 @@ def _stretch(motion: Motion, start: float | None, end: float | None) -> Motion:
         )
     if keep.all():
         return motion
-    fields = ("time", "landmarks", "orientations", "com", "contacts", "support", "hand_opening")
-    return replace(motion, **{k: None if getattr(motion, k) is None else getattr(motion, k)[keep] for k in fields})
+    whole = {name: getattr(motion, name) for name in ("time", *SAMPLED)}
+    kept: dict[str, Any] = {name: None if values is None else values[keep] for name, values in whole.items()}
+    return replace(motion, **kept)
 
 
 def _play(
