@@ -10,7 +10,7 @@ from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
-from naoimitate.balance.soles import into_tables, shortened, uncoupled_leg
+from naoimitate.balance.soles import into_tables, leg_joints, shortened, uncoupled_leg
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, yaw_matrix
 from naoimitate.fsm import Mode
@@ -39,10 +39,10 @@ class Direct:
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: legs by the paper's few iterations, nothing else."""
         self.mode = _MODES.get(footing.support, self.mode)
-        q = q_arms.copy()
+        q = np.clip(q_arms, self._robot.lower, self._robot.upper)
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._robot.tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        q = shortened(pose.q, q, reach.low, reach.high)
+        q = shortened(pose.q, q, leg_joints(self._legs), reach.low, reach.high)
         into_tables(self._legs, q)
         side = 1 if self.mode is Mode.RIGHT else 0
         hung = self._maker.hang(q, side, pose.sole_pos, pose.sole_rot)

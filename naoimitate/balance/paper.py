@@ -22,7 +22,16 @@ from naoimitate.balance.planted import SCALES, Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
 from naoimitate.balance.shift import levelled, offset_in_space, parted, shifted, swung, up_vector
-from naoimitate.balance.soles import SoleGoal, Soles, into_tables, shortened, soles_at, solve_soles, uncoupled_leg
+from naoimitate.balance.soles import (
+    SoleGoal,
+    Soles,
+    into_tables,
+    leg_joints,
+    shortened,
+    soles_at,
+    solve_soles,
+    uncoupled_leg,
+)
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
@@ -75,7 +84,7 @@ class PaperFeet:
     ) -> None:
         self._tree, self._maker, self._planted, self._gate = robot.tree, maker, planted, gate
         self._legs, self._limbs = legs, [uncoupled_leg(robot, legs, side) for side in "lr"]
-        self._leg_joints = np.concatenate([limb.joints for limb in self._limbs])
+        self._joints, self._mapped_joints = leg_joints(legs), np.concatenate([limb.joints for limb in self._limbs])
         self._law, self._ik, self._foot_speed = law, ik, foot_speed
         self._stand = maker.stand(robot.postures["stand"]).soles_in_base - legs.hip
 
@@ -84,7 +93,7 @@ class PaperFeet:
         pose = self._planted.place(q, feet, footing)
         self._fsm, self._landed, self._side, self._share = SupportFsm(), False, 0, 1.0
         self._offset, self._speed = self._planted.offset, 0.0
-        self._mapped = pose.q[self._leg_joints]
+        self._mapped = pose.q[self._mapped_joints]
         self._between = max(0.0, wrap(heading(pose.sole_rot[0]) - heading(pose.sole_rot[1])))
         half = 0.5 * self._between
         self._apart = FEET_APART - self._inner_edge(0, half) + self._inner_edge(1, -half)
@@ -111,13 +120,13 @@ class PaperFeet:
         iterations = self._solve(q, mapped, offset)
         way = np.linalg.norm(soles_at(self._tree, self._legs, q).centres - now.centres, axis=1).max()
         near = min(1.0, self._foot_speed * reach.dt / max(float(way), 1e-9))
-        q = shortened(pose.q, q_arms + near * (q - q_arms), reach.low, reach.high)
+        q = shortened(pose.q, q_arms + near * (q - q_arms), self._joints, reach.low, reach.high)
         taken, part = self._taken(pose, q, (offset, speed), reach.dt)
         flat = self._flat(taken)
         self._landed = self.mode.landing and flat
         good = part == 1.0 and (flat or near < 1.0 or self._single)
         self._share = min(max(self._share + (SHARE_SPEED if good else -SHARE_SPEED) * reach.dt, 0.0), 1.0)
-        return Answer(taken, GivenUp(0) if part > 0.0 else GivenUp.HOLD, iterations + 2 * self._ik.leg_iterations)
+        return Answer(taken, GivenUp.HOLD if part < 0.0 else GivenUp(0), iterations + 2 * self._ik.leg_iterations)
 
     def _solve(self, q: Array, soles: Soles, offset: float) -> int:
         """Put the soles of q (J,) rad where section V-C wants them; the iterations it took.
@@ -167,16 +176,18 @@ class PaperFeet:
     def _mapped_soles(self, q_arms: Array, feet: Array) -> Soles:
         """The soles where the posture mapping puts them, feet (2, 3) m from the hips; beside each other, not inside."""
         q = q_arms.copy()
-        q[self._leg_joints] = self._mapped
+        q[self._mapped_joints] = self._mapped
         for limb, foot in zip(self._limbs, feet, strict=True):
             solve_limb_fixed(self._tree, limb, foot, q, self._ik.damping, self._ik.leg_iterations)
-        self._mapped = q[self._leg_joints]
+        self._mapped = q[self._mapped_joints]
         soles = soles_at(self._tree, self._legs, q)
         return soles._replace(centres=parted(soles.centres, self._apart + (1.0 - self._share) * SPREAD))
 
     def _inner_edge(self, foot: int, yaw: float) -> float:
-        """y of the sole's inner edge from its centre, m, when the sole is turned by ``yaw`` rad."""
-        y = ((self._legs.outline[foot] - self._legs.centre[foot]) @ yaw_matrix(yaw)[:2, :2].T)[:, 1]
+        """y of the inner edge of a sole's bounding box from its centre, m, when the sole is turned by ``yaw`` rad."""
+        outline = self._legs.outline[foot] - self._legs.centre[foot]
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        y = np.sin(yaw) * np.array([low[0], high[0]]) + np.cos(yaw) * (low, high)[foot][1]
         return float(y.min() if foot == 0 else y.max())
 
     def _base_side(self, soles: Soles, offset: float) -> int:
@@ -193,10 +204,11 @@ class PaperFeet:
             self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
 
     def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float) -> tuple[Pose, float]:
-        """The whole step to q (J,) rad, a part of it, or none, whatever passes the gate first; and which part."""
+        """The step to q (J,) rad with all of the legs' step, a part, or none of it; and the part, -1 if all is refused."""
         stances = (self.mode.stance != "R", self.mode.stance != "L")
-        for part in SCALES:
-            q_part = pose.q + part * (q - pose.q)
+        for part in (*SCALES, 0.0):
+            q_part = q.copy()
+            q_part[self._joints] = (pose.q + part * (q - pose.q))[self._joints]
             into_tables(self._legs, q_part)
             candidate = self._maker.hang(q_part, self._side, self._stance_pos, self._stance_rot)
             if self._gate.passes(candidate, pose, stances, candidate.sole_pos, candidate.sole_rot, dt):
@@ -204,7 +216,7 @@ class PaperFeet:
                 self._speed = offset[1] if part == 1.0 else 0.0
                 return candidate, part
         self._speed = 0.0
-        return pose, 0.0
+        return pose, -1.0
 
     def _flat(self, pose: Pose) -> bool:
         """Whether the sole on which the robot does not hang lies on the floor as well."""

@@ -56,12 +56,19 @@ def uncoupled_leg(robot: RobotModel, legs: Legs, side: str) -> Limb:
     return limb._replace(joints=joints, lower=legs.lower[joints], upper=legs.upper[joints], rest=legs.rest[joints])
 
 
-def shortened(before: Array, q: Array, low: Array, high: Array) -> Array:
-    """The longest part of a joint step (J,) rad that stays between low and high; all joints are slowed alike."""
-    step = q - before
-    room = np.where(step > 0.0, high - before, before - low)
+def leg_joints(legs: Legs) -> npt.NDArray[np.int64]:
+    """Indices of all joints of both legs."""
+    return np.flatnonzero(legs.variable >= 0)
+
+
+def shortened(before: Array, q: Array, joints: npt.NDArray[np.int64], low: Array, high: Array) -> Array:
+    """q (J,) rad with the longest part of the step of ``joints`` that stays between low and high, all slowed alike."""
+    step = (q - before)[joints]
+    room = np.where(step > 0.0, (high - before)[joints], (before - low)[joints])
     part = float(np.min(np.where(np.abs(step) > room, room / np.maximum(np.abs(step), 1e-12), 1.0)))
-    return np.asarray(before + part * step)
+    short = q.copy()
+    short[joints] = before[joints] + part * step
+    return short
 
 
 @njit(cache=True)
