@@ -57,6 +57,8 @@ class Imitator:
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
         self._pose: Pose | None = None
+        self._hurried: Array = np.zeros(2)
+        self._unreached: Array = np.full(2, np.inf)
 
     def _build_retargeting(self, legs: Legs) -> Retargeting:
         robot, s, maker = self.robot, self.settings, self._maker

@@ -120,7 +120,7 @@ def slow_part(path: Array, time: Array, window: float) -> Array:
     """Mean (T, 2) of a path over ``window`` (s) around each moment; frames need not be evenly spaced in time."""
     half = 0.5 * window
     first, last = np.searchsorted(time, time - half), np.searchsorted(time, time + half, side="right")
-    known = np.isfinite(path).all(axis=1)
+    known = np.asarray(np.isfinite(path).all(axis=1))
     rows = np.column_stack([np.where(known[:, None], path, 0.0), known])
     total = np.concatenate([np.zeros((1, 3)), np.cumsum(rows, axis=0)])
     window_sum = total[last] - total[first]

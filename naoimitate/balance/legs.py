@@ -326,7 +326,7 @@ def solve_legs(
             if stance.kind == REACH:
                 _add_task(Jow, e_pos, weights.reach, H, g)
             else:
-                e_rot *= min(1.0, weights.secondary_step / max(np.linalg.norm(e_rot), 1e-9))
+                e_rot *= min(1.0, weights.secondary_step / max(float(np.linalg.norm(e_rot)), 1e-9))
             _add_task(Wow, e_rot, weights.reach_turn if stance.kind == REACH else weights.level, H, g)
             for k in range(corners):
                 arm = R_wo[:, 0] * legs.outline[o, k, 0] + R_wo[:, 1] * legs.outline[o, k, 1]

@@ -77,8 +77,11 @@ class Retargeting(Protocol):
     def offset(self) -> float:
         """The robot's normalised offset, 0 left to 1 right."""
 
-    def place(self, q: Array, footing: Footing) -> Pose:
-        """Stand in double support as near to the footing as the landing set allows, starting from q (J,) rad."""
+    def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
+        """Stand in double support as near to the footing as the landing set allows, starting from q (J,) rad.
+
+        feet: (2, 3) m, the targets (5) of the soles.
+        """
 
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: arms and head from q_arms (J,) rad, feet (2, 3) m the targets (5) of the soles."""

@@ -143,7 +143,7 @@ class Motion:
         return replace(
             a,
             time=float(time),
-            landmarks=_mix(a.landmarks, b.landmarks, s),
+            landmarks=(1.0 - s) * a.landmarks + s * b.landmarks,
             orientations=_mix_quaternions(a.orientations, b.orientations, s),
             com=_mix(a.com, b.com, s),
             hand_opening=_mix(a.hand_opening, b.hand_opening, s),

@@ -152,10 +152,10 @@ def torso_frame(p: Array, out: Array) -> None:
     up = p[_SHOULDERS[0]] + p[_SHOULDERS[1]] - p[_L_HIP] - p[_R_HIP]
     shoulders = p[_SHOULDERS[0]] - p[_SHOULDERS[1]]
     hips = p[_L_HIP] - p[_R_HIP]
-    across = shoulders / max(np.linalg.norm(shoulders), 1e-9) + hips / max(np.linalg.norm(hips), 1e-9)
-    z = up / max(np.linalg.norm(up), 1e-9)
+    across = shoulders / max(float(np.linalg.norm(shoulders)), 1e-9) + hips / max(float(np.linalg.norm(hips)), 1e-9)
+    z = up / max(float(np.linalg.norm(up)), 1e-9)
     x = np.cross(across, z)
-    x /= max(np.linalg.norm(x), 1e-9)
+    x /= max(float(np.linalg.norm(x)), 1e-9)
     out[:, 0] = x
     out[:, 1] = np.cross(z, x)
     out[:, 2] = z
@@ -164,9 +164,9 @@ def torso_frame(p: Array, out: Array) -> None:
 @njit(cache=True)
 def _foot_frame(ankle: Array, toe: Array, knee: Array, toe_pitch: float, out: Array) -> None:
     """Foot axes from the ankle-toe line, turned up by its slope in the T-pose, and the shank for the roll."""
-    along = (toe - ankle) / max(np.linalg.norm(toe - ankle), 1e-9)
+    along = (toe - ankle) / max(float(np.linalg.norm(toe - ankle)), 1e-9)
     across = np.cross(knee - ankle, along)
-    across /= max(np.linalg.norm(across), 1e-9)
+    across /= max(float(np.linalg.norm(across)), 1e-9)
     above = np.cross(along, across)
     c, s = math.cos(toe_pitch), math.sin(toe_pitch)
     out[:, 0] = c * along + s * above
@@ -195,4 +195,4 @@ def _observe(
         posture[2 * side] = to_torso @ (p[_WRISTS[side]] - p[_SHOULDERS[side]])
         posture[2 * side + 1] = to_torso @ (soles[side] - p[_HIPS[side]])
         upper = to_torso @ (p[_ELBOWS[side]] - p[_SHOULDERS[side]])
-        elbows[side] = upper / max(np.linalg.norm(upper), 1e-9)
+        elbows[side] = upper / max(float(np.linalg.norm(upper)), 1e-9)

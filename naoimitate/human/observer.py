@@ -69,7 +69,7 @@ class Observer:
         )
 
     def _bridged(self, landmarks: Array) -> tuple[Array, bool]:
-        good = _possible(landmarks).all(axis=1)
+        good = np.asarray(_possible(landmarks).all(axis=1))
         if good.all():
             self._last = np.array(landmarks, dtype=np.float64)
             return self._last, True
