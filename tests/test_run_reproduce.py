@@ -13,7 +13,9 @@ from naoimitate.motion.builtin import builtin_motion
 from naoimitate.robot import RobotModel, load_robot
 from naoimitate.run.evaluation import Evaluation, write_evaluation
 from naoimitate.run.file import Run
-from naoimitate.run.reproduce import CAMERA_RATE, NOISE, PARAMETER_SETS, direct_baseline, noisy, repeat
+from naoimitate.run.recorded import imitate
+from naoimitate.run.replay import frames
+from naoimitate.run.reproduce import CAMERA_RATE, NOISE, PARAMETER_SETS, direct_baseline, noisy, repeat, unsupported
 from naoimitate.run.table import PAPER_TABLE, measure_steps
 
 
@@ -66,9 +68,17 @@ def test_the_evaluation_measures_every_case_and_puts_it_beside_the_paper(
     assert "2 of 2 fell" in page
 
 
-def test_table_one_counts_the_fixed_iterations_of_the_paper(robot: RobotModel, motion: Motion) -> None:
-    """Two arms of 30 iterations and two legs of 5 are the least that a frame of the paper's set takes."""
+def test_table_one_counts_the_iterations_of_the_stabilisation_alone(robot: RobotModel, motion: Motion) -> None:
+    """Two arms of 30 iterations and two legs of 5 are fixed; a person who stands still needs hardly any more."""
     table = measure_steps(motion, robot, PARAMETER_SETS["theirs"], CAMERA_RATE)
-    assert table.iterations.min() >= 70
+    assert 0 <= table.iterations.min() < 10
     assert np.all(table.mapping > 0.0)
     np.testing.assert_allclose(table.mapping + table.stabilisation, table.total)
+
+
+def test_without_stabilisation_the_centre_of_mass_is_not_over_what_touches_the_floor(
+    robot: RobotModel, motion: Motion
+) -> None:
+    assert direct_baseline(motion, robot, None).outside > 0.5
+    stable = imitate(motion, robot, PARAMETER_SETS["ours"], sample=CAMERA_RATE)
+    assert unsupported(frames(stable, robot)) == 0.0

@@ -204,7 +204,7 @@ class PaperFeet:
             self._stance_rot[side] = yaw_matrix(heading(pose.sole_rot[side]))
 
     def _taken(self, pose: Pose, q: Array, offset: tuple[float, float], dt: float) -> tuple[Pose, float]:
-        """The step to q (J,) rad with all of the legs' step, a part, or none of it; and the part, -1 if all is refused."""
+        """The step to q (J,) rad with all of the legs' step, a part, or none; and the part, -1 where all is refused."""
         stances = (self.mode.stance != "R", self.mode.stance != "L")
         for part in (*SCALES, 0.0):
             q_part = q.copy()

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from naoimitate.core.frames import Array, Motion
+from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.contact import sole_tilt
 from naoimitate.run.file import Run
 from naoimitate.run.recorded import imitate
-from naoimitate.run.replay import frames
+from naoimitate.run.replay import Replay, frames
 from naoimitate.run.similarity import FEET, HANDS, errors, hand_excess
 from naoimitate.run.stability import margins_at_frames
 from naoimitate.settings import PAPER, Settings
@@ -60,8 +61,8 @@ class Case:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The direct imitation without stabilisation. outside: share of frames with the centre of mass outside the soles.
-    tilt: deg, of the soles that should stand, largest. fell: in simulation, None without one."""
+    """The direct imitation without stabilisation. outside: share of frames in which the centre of mass is not over what
+    touches the floor. tilt: deg, of the soles that should stand, largest. fell: in simulation, None without one."""
 
     motion: str
     run: Run
@@ -103,7 +104,16 @@ def direct_baseline(motion: Motion, robot: RobotModel, simulate: Simulate | None
     """The motion imitated without stabilisation, with the paper's parameters, and played in physics."""
     run = imitate(noisy(motion, 0), robot, replace(PAPER, retarget="direct"), sample=CAMERA_RATE)
     poses = frames(run, robot)
-    outside = float((margins_at_frames(run, poses) < 0.0).mean())
     tilt = float(np.degrees(sole_tilt(run, poses)))
     run = run if simulate is None else simulate(run)
-    return Baseline(motion.name, run, outside, tilt, run.sim_fell)
+    return Baseline(motion.name, run, unsupported(poses), tilt, run.sim_fell)
+
+
+def unsupported(poses: Replay) -> float:
+    """Share of poses whose centre of mass is not over the convex hull of the sole points that touch the floor."""
+    points = np.concatenate(poses.soles, axis=1)
+    touching = points[:, :, 2] < points[:, :, 2].min(axis=1, keepdims=True) + TOUCHING
+    outside = 0
+    for outline, down, com in zip(points[:, :, :2], touching, poses.com, strict=True):
+        outside += down.sum() < 3 or polygon_margin(convex_hull(outline[down]), com[0], com[1]) < 0.0
+    return outside / len(points)
