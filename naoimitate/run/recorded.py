@@ -58,6 +58,8 @@ def imitate(
         subject = calibrate(motion.tpose)
     imitator = Imitator(robot, settings)
     imitator.use(subject)
+    _warm_up(imitator, seen)
+    imitator.use(subject)
     law = (
         AutoPace(seen, float(seen.time[0]), settings.offset)
         if speed == "auto"
@@ -77,6 +79,13 @@ def imitate(
         end=end,
     )
     return _run(robot, settings, motion, imitator, text, commands, np.array(moments), np.array(step_times))
+
+
+def _warm_up(imitator: Imitator, motion: Motion) -> None:
+    """Step through the first frame, so that compiling or loading the kernel is not counted as a step of the run."""
+    first = motion.at(float(motion.time[0]))
+    for support in ("D", "D", "L"):
+        imitator.step(first, 0.01, support=support)
 
 
 def resample(motion: Motion, rate: float) -> Motion:
