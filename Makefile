@@ -12,7 +12,7 @@ demo: $(INSTALLED)
 test: $(INSTALLED) run-tests
 
 run-tests:
-	$(VENV)/bin/pytest
+	$(VENV)/bin/pytest -n auto
 
 $(INSTALLED): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
