@@ -16,6 +16,8 @@ from naoimitate.limb import LimbWeights, build_limb, solve_limb
 from naoimitate.robot.model import RobotModel
 
 SETTINGS = ClearanceSettings()
+ARM_SAFE = SETTINGS.safe + SETTINGS.arms
+"""m that arms keep."""
 TINY = 1e-6
 """[rad] of a step by which rows are compared with what really happens."""
 
@@ -105,7 +107,7 @@ def test_rows_of_an_arm_are_the_slopes_of_the_watched_distances(robot: RobotMode
         for g in np.flatnonzero(counted & smooth & (gaps < 0.08) & (np.abs(slope).max(axis=1) > 1e-4)):
             errors = np.abs(rows - slope[g]).max(axis=1)
             assert errors.min() < 1e-3
-            assert np.isclose(bounds[errors < 1e-3], min(SETTINGS.safe - gaps[g], SETTINGS.push)).any()
+            assert np.isclose(bounds[errors < 1e-3], min(ARM_SAFE - gaps[g], SETTINGS.arms)).any()
             watched += 1
     assert watched > 20
 
@@ -171,5 +173,24 @@ def test_overlaps_are_opened_gently_and_distances_may_shrink_to_the_safe_one(nao
     body.clearance.look(pose)
     assert body.clearance.nearest < 0.0
     _, bounds = body.clearance.limb_rows(pose, np.array(nao.chains["l_arm"]))
+    assert bounds.max() == SETTINGS.arms
+    assert bounds.min() >= ARM_SAFE - SETTINGS.reach - 0.02
+    _, bounds = body.clearance.leg_rows(pose, body.legs, 1)
     assert bounds.max() == SETTINGS.push
-    assert bounds.min() >= SETTINGS.safe - SETTINGS.reach - 0.02
+
+
+def test_arms_leave_the_legs_room_to_move(nao: RobotModel) -> None:
+    """Where an arm may come no nearer, a leg still may: hands give way to feet, or both would wait for ever."""
+    body = Body(nao)
+    q, roll = nao.postures["stand"].copy(), nao.joint("LShoulderRoll")
+    arms = [*nao.chains["l_arm"], *nao.chains["r_arm"]]
+    q[arms] = nao.postures["arms_down"][arms]
+    for angle in np.arange(0.0, 0.4, 0.002):
+        q[roll], q[nao.joint("RShoulderRoll")] = angle, -angle
+        pose = body.stand(q.copy())
+        body.clearance.look(pose)
+        if body.clearance.nearest > SETTINGS.safe + 0.5 * SETTINGS.arms:
+            break
+    assert body.clearance.touching(np.array(nao.chains["l_arm"]))
+    assert body.clearance.limb_rows(pose, np.array(nao.chains["l_arm"]))[1].max() > 0.0
+    assert body.clearance.leg_rows(pose, body.legs, 1)[1].max() < 0.0

@@ -33,6 +33,9 @@ class ClearanceSettings:
     """[m] below which a pair is watched."""
     push: float = 0.0005
     """[m] by which shapes that are too near are parted in one frame."""
+    arms: float = 0.002
+    """[m] that arms keep beyond ``safe``, and by which they are parted in one frame: legs come before hands, and hands
+    that stay as near as they may would leave the legs no way."""
 
 
 class Clearance:
@@ -74,14 +77,14 @@ class Clearance:
         """Whether a link of these joints is as near to another shape or the floor as it may come."""
         mine = np.isin(self._shapes.link - 1, joints)
         pairs = mine[self._pairs].any(axis=1) if len(self._pairs) else np.zeros(0, dtype=bool)
-        close = self._settings.safe + self._settings.push
+        close = self._settings.safe + self._settings.arms + self._settings.push
         return bool((self._d[pairs] < close).any() or (self._lowest[mine, 2] < close).any())
 
     def limb_rows(self, pose: Pose, joints: Ints) -> tuple[Array, Array]:
         """Rows (C, n) and bounds (C,) m for a limb whose joints (n,) move while the base stays."""
         return _limb_rows(
             self._tree, joints, self._pairs, self._shapes, self._d, self._a, self._b, self._normal, self._lowest,
-            self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._numbers,
+            self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._arm_numbers,
         )  # fmt: skip
 
     def leg_rows(self, pose: Pose, legs: Legs, side: int) -> tuple[Array, Array]:
@@ -94,6 +97,10 @@ class Clearance:
     @property
     def _numbers(self) -> tuple[float, float, float]:
         return self._settings.safe, self._settings.reach, self._settings.push
+
+    @property
+    def _arm_numbers(self) -> tuple[float, float, float]:
+        return self._settings.safe + self._settings.arms, self._settings.reach, self._settings.arms
 
 
 @njit(cache=True)

@@ -60,8 +60,8 @@ class SwingSettings:
     """[m] below which the foot does not come before it is level."""
     patience: float = 1.5
     """[s] of approach after which a foot that does not arrive may come down near its place."""
-    yielding: float = 0.01
-    """[m/s] by which the distance that is near enough grows from then on."""
+    yielding: float = 0.015
+    """[m] by which the distance that is near enough grows while it gives way."""
     hover: float = 0.12
     """[s] over the landing place before the foot goes down: what sways comes to rest."""
     blocked: float = 0.2
@@ -142,7 +142,7 @@ class Swing:
         turn = rotation_vector(level @ rotation.T)
         way, angle = target - position, float(np.linalg.norm(turn))
         self._waited += dt
-        near = self.settings.arrived + self.settings.yielding * max(self._waited - self.settings.patience, 0.0)
+        near = self.settings.arrived + self.settings.yielding * self.lateness
         settled = np.linalg.norm(moved) < self.settings.settled * dt or self._waited > self.settings.patience
         arrived = np.linalg.norm(way) < near and 0.1 * angle < near and settled
         self._hovered = self._hovered + dt if arrived else 0.0
