@@ -163,7 +163,8 @@ def _limb_rows(
             for end in range(2):
                 point_jacobian(tree, pos, rot, link[pairs[p, end]] - 1, points[k], J)
                 for i in range(n):
-                    rows[count, i] += (2.0 * end - 1.0) * np.dot(normal[p], J[:, joints[i]])
+                    for axis in range(3):
+                        rows[count, i] += (2.0 * end - 1.0) * normal[p, axis] * J[axis, joints[i]]
             count = _keep(rows, bounds, count, _bound(gaps[k], safe, push))
     up = np.ascontiguousarray(base_rot[2])
     for s in range(lowest.shape[0]):
@@ -171,7 +172,8 @@ def _limb_rows(
             continue
         point_jacobian(tree, pos, rot, link[s] - 1, base_rot.T @ (lowest[s] - base_pos), J)
         for i in range(n):
-            rows[count, i] = np.dot(up, J[:, joints[i]])
+            for axis in range(3):
+                rows[count, i] += up[axis] * J[axis, joints[i]]
         count = _keep(rows, bounds, count, _bound(lowest[s, 2], safe, push))
     return rows[:count], bounds[:count]
 
