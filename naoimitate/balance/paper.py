@@ -43,8 +43,8 @@ Array = npt.NDArray[np.float64]
 
 TOUCHDOWN = 0.005
 """[m] off the floor at which a landing foot counts as down: what 1 mm and 0.033 rad leave over 0.1 m."""
-SWING_CLEARANCE = 0.008
-"""[m] of a swing sole's lowest point above the floor: 5 mm, and what the tolerances of the solve take from it."""
+SWING_CLEARANCE = 0.015
+"""[m] of a swing sole's lowest point above the floor (design: section 4.6)."""
 FEET_APART = 0.010
 """[m] kept between the soles' inner edges: what shifting one of them sideways may take, and 5 mm."""
 SPREAD = 0.05
