@@ -99,6 +99,15 @@ def test_the_robot_is_stable_flat_and_live_through_every_builtin(nao: RobotModel
         assert np.mean(run.support == run.human_support) > 0.9
 
 
+@pytest.mark.parametrize("parameters", SETS)
+def test_another_robot_steps_and_reaches_too(second_robot: RobotModel, parameters: str) -> None:
+    run = imitate(builtin_motion("step-and-reach"), second_robot, SETS[parameters], rate=RATE, sample=30.0, end=15.0)
+    poses = frames(run, second_robot)
+    assert poses.margins(run.support).min() >= 0.005
+    assert sole_tilt(run, poses) < IK.angle_tolerance
+    assert np.mean(run.support == run.human_support) > 0.9
+
+
 def still(frame: HumanFrame, seconds: float, dt: float = 0.02) -> Iterator[HumanFrame]:
     for k in range(round(seconds / dt)):
         yield replace(frame, time=frame.time + k * dt)
