@@ -130,6 +130,18 @@ def test_a_jump_is_a_flight() -> None:
         assert (modes[np.abs(t) < 0.1] == "F").all()
 
 
+def test_who_rises_to_the_tips_of_bent_toes_stands_and_does_not_fly() -> None:
+    motion = standing(300)
+    rise = 0.09 * np.clip(np.sin(np.pi * (motion.time - 0.5) / 2.0), 0.0, None)[:, None, None] * [0.0, 0.0, 1.0]
+    balls = motion.landmarks[:, FEET].reshape(-1, 2, 2, 3)[:, :, 1]
+    tips = balls * [1.0, 1.0, 0.0] + [0.05, 0.0, 0.01]
+    risen = replace(motion, landmarks=motion.landmarks + rise)
+    feet = np.concatenate([risen.landmarks[:, FEET].reshape(-1, 2, 2, 3), tips[:, :, None]], axis=2)
+    assert set(raw_support(risen, feet).classes) == {"D"}
+    feet[:, :, 2] = np.nan
+    assert "F" in raw_support(risen, feet).classes, "only the tips could tell"
+
+
 def test_a_sliding_foot_keeps_the_last_mode_but_is_told_apart() -> None:
     motion = standing(300)
     slide = 0.8 * np.clip(motion.time - 1.0, 0.0, 1.0)

@@ -13,8 +13,10 @@ import pytest
 import yaml
 
 from naoimitate.core.frames import LANDMARK, Motion
-from naoimitate.human.support import SupportEstimator, raw_support
+from naoimitate.human.support import SupportEstimator, last_mode, raw_support
 from naoimitate.motion import load_motion
+from naoimitate.motion.load import recorded
+from naoimitate.motion.scene import Options
 
 MOCAP = Path(os.environ.get("NAOIMITATE_MOCAP", Path(__file__).parents[2] / "shared" / "mocap"))
 pytestmark = pytest.mark.skipif(not (MOCAP / "INDEX.yaml").exists(), reason=f"no recorded clips in {MOCAP}")
@@ -23,23 +25,28 @@ CLIPS: list[dict[str, Any]] = (
 )
 FRACTIONS = {"double": "D", "left": "L", "right": "R", "flight": "F", "feet_moving": "M"}
 STRETCHES = {"longest_left_s": "L", "longest_right_s": "R"}
-TOES = ("05_20", "deepmimic")
-"""Clips whose facts need the file's own toes: bent in the dance, none in DeepMimic's figure. Landmarks tell neither."""
+TOELESS = ("deepmimic",)
+"""Clips whose skeleton ends at the ankle: the facts know no toes, the landmarks' toes are a person's proportions."""
+every_clip = pytest.mark.parametrize("clip", CLIPS, ids=lambda clip: clip["file"])
 
 
-def with_marks(clip: dict[str, Any]) -> Any:
-    guessed = any(part in clip["file"] for part in TOES)
-    reason = "the file's own toe points do not reach the analysis; the landmarks' toes are guessed"
-    return pytest.param(
-        clip, marks=[pytest.mark.xfail(reason=reason, strict=False)] if guessed else [], id=clip["file"]
-    )
+def options(file: str) -> Options:
+    clip = next(clip for clip in CLIPS if clip["file"] == file)
+    skeleton = MOCAP / clip["asf_file"] if "asf_file" in clip else None
+    return Options(fps=clip["fps_true"], skeleton=skeleton)
 
 
 @cache
 def motion(file: str) -> Motion:
-    clip = next(clip for clip in CLIPS if clip["file"] == file)
-    skeleton = MOCAP / clip["asf_file"] if "asf_file" in clip else None
-    return load_motion(MOCAP / file, fps=clip["fps_true"], skeleton=skeleton)
+    wishes = options(file)
+    return load_motion(MOCAP / file, fps=wishes.fps, skeleton=wishes.skeleton)
+
+
+@cache
+def whole_clip(file: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and raw classes by the whole-clip analysis."""
+    recording, feet = recorded(MOCAP / file, options(file))
+    return recording.time, raw_support(recording, feet).classes
 
 
 def runs(classes: np.ndarray, wanted: str) -> list[tuple[int, int]]:
@@ -63,22 +70,34 @@ def deviations(
     ]
 
 
-@pytest.mark.parametrize("clip", [with_marks(clip) for clip in CLIPS])
+@every_clip
 def test_the_whole_clip_analysis_agrees_with_the_measured_bands(clip: dict[str, Any]) -> None:
-    m = motion(clip["file"])
-    assert deviations(clip, m.time, raw_support(m).classes, 0.03, 0.1) == []
+    assert deviations(clip, *whole_clip(clip["file"]), 0.03, 0.1) == []
 
 
-@pytest.mark.parametrize("clip", [with_marks(clip) for clip in CLIPS])
+@every_clip
+def test_the_whole_clip_analysis_is_near_the_measured_shares(clip: dict[str, Any]) -> None:
+    classes = whole_clip(clip["file"])[1]
+    off = {name: float(np.mean(classes == mode)) - clip["support"][name] for name, mode in FRACTIONS.items()}
+    assert max(map(abs, off.values())) < 0.04, off
+
+
+@every_clip
 def test_single_support_windows_are_found_where_they_are(clip: dict[str, Any]) -> None:
-    m = motion(clip["file"])
-    classes = raw_support(m).classes
+    time, classes = whole_clip(clip["file"])
     for side, begin, end in clip["single_support_windows_ge_0p5s"]:
-        found = [(m.time[a], m.time[min(b, len(m) - 1)]) for a, b in runs(classes, side[0].upper())]
+        found = [(time[a], time[min(b, len(time) - 1)]) for a, b in runs(classes, side[0].upper())]
         assert any(abs(a - begin) <= 0.1 and abs(b - end) <= 0.1 for a, b in found), (side, begin, end, found)
 
 
-@pytest.mark.parametrize("clip", CLIPS, ids=lambda clip: clip["file"])
+@every_clip
+def test_the_loaded_support_is_that_of_the_whole_clip_analysis(clip: dict[str, Any]) -> None:
+    loaded = motion(clip["file"])
+    assert loaded.support is not None
+    assert np.array_equal(loaded.support, last_mode(whole_clip(clip["file"])[1]))
+
+
+@every_clip
 def test_the_floor_of_a_loaded_clip_is_level_and_at_zero(clip: dict[str, Any]) -> None:
     m = motion(clip["file"])
     assert m.contacts is not None and m.tpose is not None
@@ -103,10 +122,10 @@ def test_the_causal_estimate_follows_the_whole_clip_analysis() -> None:
 
 
 def test_the_causal_estimate_is_near_the_bands() -> None:
-    """Fractions within 0.05 of the band on every clip, the toes' apart; it cannot close gaps that it has not seen."""
+    """Fractions within 0.05 of the band on every clip with toes; it cannot close gaps that it has not seen."""
     wrong = {}
     for clip in CLIPS:
-        if not any(part in clip["file"] for part in TOES):
+        if not any(part in clip["file"] for part in TOELESS):
             m = motion(clip["file"])
             off = [text for text in deviations(clip, m.time, live(m)[0], 0.05, 0.2) if "longest" not in text]
             if off:

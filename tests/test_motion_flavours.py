@@ -15,6 +15,8 @@ from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import LANDMARK, LANDMARKS, SEGMENTS, Motion
 from naoimitate.motion import load_motion
 from naoimitate.motion.builtin import builtin_motion
+from naoimitate.motion.load import recorded
+from naoimitate.motion.scene import Options
 from naoimitate.motion.tpose import is_tpose
 
 pytestmark = pytest.mark.filterwarnings("ignore:Gimbal lock")
@@ -150,6 +152,38 @@ def test_a_skeleton_without_a_needed_joint_says_which(joint: str, tmp_path: Path
     says = {"l": "left", "r": "right"}[joint[0]] + " " + joint[2:]
     with pytest.raises(MotionFormatError, match=says):
         read(tmp_path, bvh(truth("squat"), Style(without=(joint,)), STEP))
+
+
+@pytest.mark.parametrize(
+    ("names", "without", "known"),
+    [
+        ("plain", (), (True, True, True)),
+        ("xsens", (), (True, True, True)),
+        ("daz", (), (True, True, False)),
+        ("plain", ("l_toe", "r_toe"), (True, True, False)),
+    ],
+)
+def test_the_points_of_the_feet_are_those_of_the_skeleton(
+    names: str, without: tuple[str, ...], known: tuple[bool, ...], tmp_path: Path
+) -> None:
+    style = Style(FLAVOURS[names], without=without, axes=Z_UP, unit=0.0254, rate=RATE)
+    (tmp_path / "person.bvh").write_text(bvh(truth("squat"), style, STEP))
+    motion, feet = recorded(tmp_path / "person.bvh", Options())
+    assert np.isfinite(feet).all(axis=(0, 1, 3)).tolist() == list(known)
+    assert np.isfinite(feet).any(axis=(0, 1, 3)).tolist() == list(known)
+    for i, side in enumerate("lr"):
+        ankle, toe = (motion.landmarks[:, LANDMARK[f"{side}_{part}"]] for part in ("ankle", "toe"))
+        assert np.allclose(feet[:, i, :2], np.stack([ankle, toe], axis=1), atol=1e-9)
+        if known[2]:
+            assert np.allclose(np.linalg.norm(feet[:, i, 2] - toe, axis=-1), 0.05, atol=1e-4)
+            assert np.allclose(feet[:, i, 2, 2], toe[:, 2], atol=1e-3), "the toes of a squat lie flat"
+
+
+def test_a_skeleton_that_ends_at_the_ankles_has_no_points_of_the_toes(tmp_path: Path) -> None:
+    (tmp_path / "swing.txt").write_text(motion_texts.deepmimic())
+    motion, feet = recorded(tmp_path / "swing.txt", Options())
+    assert np.isfinite(motion.landmarks).all() and np.isfinite(feet[:, :, 0]).all()
+    assert np.isnan(feet[:, :, 1:]).all()
 
 
 def test_an_acclaim_pair_comes_back_with_its_skeleton_beside_it_or_named(tmp_path: Path) -> None:

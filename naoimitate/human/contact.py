@@ -17,8 +17,9 @@ from naoimitate.human.floor import SLOW, Floor, Mask, fit_floor
 
 MOVING = "M"
 """Raw class of a frame in which no foot is planted, but one is near the floor: it slides, pivots or rolls off."""
+FEET = [[LANDMARK[f"{side}_{name}"] for name in ("ankle", "toe")] for side in SIDES]
+"""Rows of the landmarks of the left and the right foot."""
 _CLASSES = np.array([MOVING, "R", "L", "D", "F"])
-_FEET = [[LANDMARK[f"{side}_{name}"] for name in ("ankle", "toe")] for side in SIDES]
 _BODY = [row for name, row in LANDMARK.items() if name.split("_")[-1] not in ("ankle", "toe", "hand")]
 
 
@@ -81,7 +82,7 @@ class Contacts:
 
 def foot_points(landmarks: Array, tip: float) -> Array:
     """Ankle, ball and tip of the toes of both feet, (..., 19, 3) m -> (..., 2, 3, 3) m."""
-    known = np.where(np.isfinite(landmarks[..., _FEET, :]), landmarks[..., _FEET, :], np.nan)
+    known = np.where(np.isfinite(landmarks[..., FEET, :]), landmarks[..., FEET, :], np.nan)
     ankle, ball = known[..., 0, :], known[..., 1, :]
     return np.stack([ankle, ball, ball + tip * (ball - ankle)], axis=-2)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -110,4 +110,4 @@ def _head_raised(posture: Track) -> Track:
     """The posture with the head turned like the chest, as in the rest pose."""
     turns = posture.turns.copy()
     turns[:, SEGMENT["head"]] = turns[:, SEGMENT["chest"]]
-    return Track(posture.landmarks, turns)
+    return replace(posture, turns=turns)

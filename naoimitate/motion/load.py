@@ -29,18 +29,21 @@ def load_file(path: Path, options: Options) -> Motion:
     """
     try:
         with np.errstate(all="ignore"):  # damaged numbers become gaps, and gaps are bridged or said
-            return annotate(_load(path, options))
+            return annotate(*recorded(path, options))
     except MotionFormatError as error:
         raise MotionFormatError(f"{path.name}: {error}" if path.name not in str(error) else str(error)) from error
 
 
-def _load(path: Path, options: Options) -> Motion:
-    """The motion of a file as it is over its own floor, which may be tilted or not at z = 0."""
+def recorded(path: Path, options: Options) -> tuple[Motion, Array]:
+    """The motion of a file over its own floor, which may be tilted or not at z = 0, and the points of its feet.
+
+    These are (T, 2, 3, 3) m, ankle, ball and tip of the toes where the skeleton itself has them, else NaN.
+    """
     clip, data = read(path, options.skeleton)
     scene = scene_of(clip, options)
     rate, rate_note = true_rate(clip, scene.motion[scene.added :].landmarks, path.name, scene.family, options.fps)
-    motion, damage = bridged(scene.motion, rate)
-    scene = replace(scene, motion=motion)
+    whole, damage = bridged(scene.motion, rate)
+    scene = replace(scene, motion=whole)
     time = _times(clip, rate, options.fps)
     calibration = calibrate(scene, time, rate, options.tpose_at)
     who = person(calibration.reference, scene.head_is_joint)
@@ -48,7 +51,7 @@ def _load(path: Path, options: Options) -> Motion:
     kept, time = scene.motion[scene.added :].turned(turn), time[scene.added :]
     landmarks = landmarks_of(who, kept) + shift
     notes = [*scene.notes, rate_note, _left_out(scene.added), *damage, teleports(landmarks, time), who.note]
-    return Motion(
+    motion = Motion(
         name=path.stem,
         time=time,
         landmarks=landmarks,
@@ -61,6 +64,7 @@ def _load(path: Path, options: Options) -> Motion:
         sha256=hashlib.sha256(data).hexdigest(),
         notes=tuple(note for note in notes if note),
     )
+    return motion, kept.feet + shift
 
 
 def _left_out(frames: int) -> str:

@@ -96,7 +96,7 @@ def orientations_of(who: Person, track: Track) -> Array:
 
 def reference_frame(who: Person) -> HumanFrame:
     """The straightened T-pose as a frame: facing x, mid-hip over the origin, soles at z = 0."""
-    track = Track(who.reference.landmarks[None], who.reference.turns[None])
+    track = Track(who.reference.landmarks[None], who.reference.turns[None], np.full((1, 2, 3), np.nan))
     landmarks = landmarks_of(who, track)[0]
     ankles = landmarks[[LANDMARK["l_ankle"], LANDMARK["r_ankle"]], 2]
     landmarks[:, 2] += Anthropometry(who.reference.stature).ankle_height - ankles.mean()

@@ -29,7 +29,7 @@ class Anatomy:
     family: what the skeleton is, for people. nodes: landmark to node, for shoulders, elbows, wrists, hips, knees and
     ankles always, for hands and toes where the skeleton has them. pelvis, chest: nodes from which legs and arms part
     (the same one when there is no spine). head: the joint about which the head turns. head_end: the end of its bone.
-    palms: (left, right) joints that turn the hands.
+    palms: (left, right) joints that turn the hands. tips: (left, right) ends of the toes beyond their joints, or None.
     """
 
     family: str
@@ -39,6 +39,7 @@ class Anatomy:
     head: int | None
     head_end: int | None
     palms: tuple[int, int]
+    tips: tuple[int | None, int | None]
 
 
 def recognise(clip: Clip) -> Anatomy:
@@ -69,7 +70,8 @@ def recognise(clip: Clip) -> Anatomy:
         nodes.update(_extremities(skeleton, words, side, nodes))
     head, head_end = _head(skeleton, words, nodes, chest)
     palms = _palm(words, nodes, "l"), _palm(words, nodes, "r")
-    return Anatomy(family or "common joint names", nodes, pelvis, chest, head, head_end, palms)
+    tips = _toe_tip(skeleton, nodes, "l"), _toe_tip(skeleton, nodes, "r")
+    return Anatomy(family or "common joint names", nodes, pelvis, chest, head, head_end, palms, tips)
 
 
 def _words(skeleton: Skeleton) -> list[tuple[str, str]]:
@@ -141,6 +143,16 @@ def _extremities(skeleton: Skeleton, words: list[tuple[str, str]], side: str, no
         elif inner := [i for i in skeleton.children(start) if i in below]:
             found[f"{side}_{name}"] = _middle_one(skeleton, inner)
     return found
+
+
+def _toe_tip(skeleton: Skeleton, nodes: dict[str, int], side: str) -> int | None:
+    """The farthest point beyond the ball of one foot; None where the skeleton ends there or has no toes."""
+    toe = nodes.get(f"{side}_toe")
+    if toe is None:
+        return None
+    beyond = {i: bone_length(skeleton, toe, i) for i in skeleton.below(toe)}
+    tip = max(beyond, key=beyond.__getitem__)
+    return tip if beyond[tip] > SHORT * leg_length(skeleton, nodes) else None
 
 
 def _middle_one(skeleton: Skeleton, nodes: list[int]) -> int:

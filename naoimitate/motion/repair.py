@@ -29,25 +29,30 @@ def bridged(track: Track, rate: float) -> tuple[Track, list[str]]:
 
     Raises MotionFormatError when a needed landmark is in no frame.
     """
-    landmarks = track.landmarks.copy()
+    points = np.concatenate([track.landmarks, track.tips], axis=1)
     with np.errstate(invalid="ignore"):
-        bad = np.asarray(~(np.abs(landmarks) < FARTHEST).all(axis=-1))
-    landmarks[bad] = np.nan
+        bad = np.asarray(~(np.abs(points) < FARTHEST).all(axis=-1))
+    points[bad] = np.nan
     for name in NEEDED:
         if bad[:, LANDMARK[name]].all():
             raise MotionFormatError(f"the {_WORDS[name[0]]} {name[2:]} is in no frame: export the clip again")
     gaps = bad & ~bad.all(axis=0)
     if not gaps.any() and np.isfinite(track.turns[:, ~np.isnan(track.turns).all(axis=(0, 2, 3))]).all():
-        return Track(landmarks, track.turns), []
+        return _track(points, track.turns), []
     longest = max(1, round(LONGEST_GAP * rate))
     for row in np.flatnonzero(gaps.any(axis=0)):
-        _fill(landmarks[:, row], longest)
+        _fill(points[:, row], longest)
     turns = _held(track.turns, longest)
-    left = (~np.isfinite(landmarks).all(axis=-1) & gaps).any(axis=1).sum()
+    left = (~np.isfinite(points).all(axis=-1) & gaps).any(axis=1).sum()
     notes = [f"{int(gaps.any(axis=1).sum())} frames had gaps; those up to {LONGEST_GAP:g} s were interpolated."]
     if left:
         notes.append(f"{int(left)} frames keep missing landmarks: their gaps are longer.")
-    return Track(landmarks, turns), notes
+    return _track(points, turns), notes
+
+
+def _track(points: Array, turns: Array) -> Track:
+    """The track of landmarks and tips one after the other, (T, 21, 3) m."""
+    return Track(points[:, : len(LANDMARKS)], turns, points[:, len(LANDMARKS) :])
 
 
 def _fill(points: Array, longest: int) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from naoimitate.core.frames import LANDMARK, LANDMARKS, SEGMENT, SEGMENTS, SIDES, Array
+from naoimitate.human.contact import FEET
 from naoimitate.motion.clip import Clip, Posture
 from naoimitate.motion.recognise import Anatomy
 
@@ -21,26 +22,32 @@ CHEST_RANGE = (0.15, 1.02)
 class Track:
     """Landmarks (T, 19, 3) as ``LANDMARKS`` and rotations (T, 7, 3, 3) of the joints that turn the ``SEGMENTS``.
 
-    NaN where the skeleton has none. The rotations are identity in the skeleton's rest pose.
+    tips: (T, 2, 3) of the toes, left and right, which no landmark is. NaN where the skeleton has none. The rotations
+    are identity in the skeleton's rest pose.
     """
 
     landmarks: Array
     turns: Array
+    tips: Array
 
     def __len__(self) -> int:
         return len(self.landmarks)
 
     def __getitem__(self, frames: slice) -> Track:
-        return Track(self.landmarks[frames], self.turns[frames])
+        return Track(self.landmarks[frames], self.turns[frames], self.tips[frames])
+
+    @property
+    def feet(self) -> Array:
+        """Ankle, ball and tip of the toes of both feet, (T, 2, 3, 3)."""
+        return np.concatenate([self.landmarks[:, FEET], self.tips[:, :, None]], axis=2)
 
     def mapped(self, turn: Array, scale: float) -> Track:
         """In other axes and units: points p become scale * turn @ p; the rest pose turns along."""
-        landmarks = scale * self.landmarks @ turn.T
-        return Track(landmarks, turn @ self.turns @ turn.T)
+        return Track(scale * self.landmarks @ turn.T, turn @ self.turns @ turn.T, scale * self.tips @ turn.T)
 
     def turned(self, turn: Array) -> Track:
         """The person turned in the world, (3, 3); the rest pose stays."""
-        return Track(self.landmarks @ turn.T, turn @ self.turns)
+        return Track(self.landmarks @ turn.T, turn @ self.turns, self.tips @ turn.T)
 
 
 def track(clip: Clip, anatomy: Anatomy) -> Track:
@@ -70,7 +77,11 @@ def _extract(positions: Array, rotations: Array, rest: Array, anatomy: Anatomy) 
     for side, palm in zip(SIDES, anatomy.palms, strict=True):
         turns[:, SEGMENT[f"{side}_hand"]] = rotations[:, palm]
         turns[:, SEGMENT[f"{side}_foot"]] = rotations[:, anatomy.nodes[f"{side}_ankle"]]
-    return Track(landmarks, turns)
+    tips = np.full((len(positions), len(SIDES), 3), np.nan)
+    for side, tip in enumerate(anatomy.tips):
+        if tip is not None:
+            tips[:, side] = positions[:, tip]
+    return Track(landmarks, turns, tips)
 
 
 def _is_chest(rest: Array, anatomy: Anatomy) -> bool:
