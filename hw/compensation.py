@@ -13,11 +13,9 @@ from numba import njit
 
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.geometry import polygon_centroid
+from naoimitate.core.physics import GRAVITY
 from naoimitate.robot.kernel import center_of_mass, forward
 from naoimitate.robot.model import RobotModel, Tree
-
-GRAVITY = 9.81
-"""m/s^2."""
 
 
 class GravityCompensation:

@@ -242,6 +242,11 @@ class Imitator:
         return self._retargeting.offset
 
     @property
+    def may_lift(self) -> bool:
+        """Whether a foot could be lifted now: the CoM has come to rest over the other one."""
+        return self._retargeting.may_lift
+
+    @property
     def lag(self) -> float:
         """How far (m) the hands and a swing foot are behind their targets at their speed limits."""
         feet = self._feet.behind[[self.mode.stance == "R", self.mode.stance == "L"]]

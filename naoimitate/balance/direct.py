@@ -25,6 +25,8 @@ _MODES = {"D": Mode.DOUBLE, "L": Mode.LEFT, "R": Mode.RIGHT}
 class Direct:
     """The feet where the mapping puts them; the torso as the person's; the lower sole on the floor."""
 
+    may_lift = True
+
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
         self._robot, self._maker, self._planted, self._ik = robot, maker, planted, ik
         self._legs, self._rows = legs, legs.sole_joint + 1

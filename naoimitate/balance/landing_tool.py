@@ -10,8 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance, ClearanceSettings
-from naoimitate.balance.legs import POSE, LegLimits, LegWeights, Stance, build_legs, free_goal, solve_legs
+from naoimitate.balance.leg_solver import solve_legs
+from naoimitate.balance.legs import POSE, LegLimits, LegWeights, Stance, build_legs, free_goal
 from naoimitate.balance.pose import Pose, PoseMaker
+from naoimitate.balance.retarget import Reach
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.robot.model import RobotModel
 
@@ -149,11 +151,11 @@ class Prover:
         rot = np.stack([yaw_matrix(yaw), np.eye(3)])
         left, right = self._maker.centres(soles, rot)[:, :2]
         feet, shares = pose.soles_in_base - self._legs.hip, np.array([1.0 - offset, offset])
-        goal = free_goal(self._legs, feet, left + offset * (right - left), np.ones(2), shares)
+        goal = free_goal(feet, left + offset * (right - left), np.ones(2), shares)
         self._clearance.look(pose)
         rows = self._clearance.leg_rows(pose, self._legs, 1)
         q, stance = pose.q.copy(), Stance(1, soles, rot, POSE, 0.0)
-        _, closure, _ = solve_legs(
-            self._tree, self._legs, self._weights, stance, goal, q, pose.q - STEP, pose.q + STEP, *rows
-        )
+        low, high = pose.q - STEP, pose.q + STEP
+        reach = Reach(1.0, low, high, low, high)
+        _, closure, _ = solve_legs(self._tree, self._legs, self._weights, stance, goal, q, reach, *rows)
         return self._maker.hang(q, 1, soles, rot) if closure < CLOSED else None

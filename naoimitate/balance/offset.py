@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.core.physics import GRAVITY
 from naoimitate.limits import braking_speed
 
 Array = npt.NDArray[np.float64]
-GRAVITY = 9.81
-"""m/s^2."""
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,11 @@ class PaperFeet:
         """The robot's normalised offset, 0 left to 1 right."""
         return self._offset
 
+    @property
+    def may_lift(self) -> bool:
+        """The published machine waits for the offset alone."""
+        return True
+
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: mapped feet, the offset of this frame, one foot shifted, both turned to the ground."""
         offset, speed = self._next_offset(pose, footing, reach.dt)

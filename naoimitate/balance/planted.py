@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance
-from naoimitate.balance.legs import FREE, POSE, LegGoal, Legs, LegWeights, Stance, free_goal, solve_legs
+from naoimitate.balance.leg_solver import solve_legs
+from naoimitate.balance.legs import FREE, POSE, Legs, LegWeights, Stance, free_goal
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
 from naoimitate.balance.stride import Plan, Stride
+from naoimitate.balance.sway import Sway
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import (
     heading,
@@ -33,27 +33,13 @@ CLOSED = 2e-5
 PLACE_STEPS = 150
 PLACE_STEP = 0.1
 """[rad] of each joint in one step of ``place``."""
+PLACE_TIME = 1.0
+"""[s] of one step of ``place``: nothing that a frame's time bounds is in its way."""
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
 LANDING_WEIGHT = 0.3
 """Of the stance foot's target while the other one lands: the torso gives way, as in the proof of the landing set."""
-
-
-@dataclass(frozen=True)
-class CalmTorso:
-    """How fast the torso may turn, wherever the feet allow it."""
-
-    turn_speed: float = 1.0
-    """[rad/s]."""
-    turn_acceleration: float = 8.0
-    """[rad/s^2]: with about 0.05 kg m^2 and 52 N that moves the ZMP of a small humanoid by 1 cm."""
-    speed: float = 0.2
-    """[m/s]."""
-    acceleration: float = 1.5
-    """[m/s^2]."""
-    on_one_foot: float = 0.5
-    """Share of all of these on one foot."""
 
 
 class Planted:
@@ -71,7 +57,7 @@ class Planted:
     ) -> None:
         self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
         self._weights, self._clearance, self._gate = weights, clearance, gate
-        self._calm, self._turning, self._moving = CalmTorso(), np.zeros(3), np.zeros(3)
+        self._sway = Sway(robot)
 
     @property
     def mode(self) -> Mode:
@@ -83,10 +69,15 @@ class Planted:
         """The robot's normalised offset, 0 left to 1 right."""
         return self._stride.offset
 
+    @property
+    def may_lift(self) -> bool:
+        """Whether the body has been at rest over one foot for long enough to lift the other."""
+        return self._stride.may_lift
+
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: the whole step, a part of it, or none, whatever passes the gate first."""
         stride = self._stride
-        plan = stride.plan(pose, footing, reach.dt)
+        plan = stride.plan(pose, footing, self._sway.calm, reach.dt)
         stances = (stride.mode.stance != "R", stride.mode.stance != "L")
         given_up = GivenUp.LANDING if plan.clipped else GivenUp(0)
         iterations = 0
@@ -97,11 +88,10 @@ class Planted:
             candidate = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
                 stride.accept(plan, scale)
-                self._turning = rotation_vector(pose.base_rot.T @ candidate.base_rot) / reach.dt
-                self._moving = pose.base_rot.T @ (candidate.base_pos - pose.base_pos) / reach.dt
+                self._sway.accept(pose, candidate, reach.dt)
                 return Answer(candidate, given_up, iterations)
         stride.hold()
-        self._turning, self._moving = np.zeros(3), np.zeros(3)
+        self._sway.rest()
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
     def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
@@ -121,23 +111,19 @@ class Planted:
             foot_weight[:] = (LANDING_WEIGHT, LANDING_WEIGHT) if stride.mode.landing else (1.0, 1.0)
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
-        goal = free_goal(self._legs, feet, stride.com_goal(offset), foot_weight, self._shares(offset))
-        calm = goal if reach.dt == 0.0 else self._calmed(goal, reach.dt)
+        goal = free_goal(feet, stride.com_goal(offset), foot_weight, self._shares(offset))
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side)
-        ways = (
-            (calm, reach.smooth_low, reach.smooth_high, rows[1]),
-            (calm, reach.low, reach.high, rows[1]),
-            (_may_stop(calm), reach.low, reach.high, rows[1]),
-            (goal._replace(lever=np.full(2, np.inf)), reach.low, reach.high, np.minimum(rows[1], 0.0)),
-        )
+        about, low, high = self._sway.bounds(pose, moved, plan.sway, reach.dt)
+        goal = goal._replace(about=about, sway_low=low, sway_high=high)
+        ways = ((goal, rows[1]), (goal._replace(overload=np.inf), np.minimum(rows[1], 0.0)))
         start, iterations = q.copy(), 0
-        for wish, low, high, bounds in ways:
+        for wish, bounds in ways:
             q[:] = start
-            done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, wish, q, low, high, rows[0], bounds)
+            done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, wish, q, reach, rows[0], bounds)
             iterations += done
             if done > 0 and (plan.kind != POSE or closure < CLOSED):
                 return iterations, True
@@ -148,13 +134,6 @@ class Planted:
         if self._stride.swinging:
             return np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
         return np.array([1.0 - offset, offset])
-
-    def _calmed(self, goal: LegGoal, dt: float) -> LegGoal:
-        """The goal with the torso's bounds of speed and acceleration for a frame of dt s."""
-        calm, share = self._calm, self._calm.on_one_foot if self._stride.swinging else 1.0
-        turn = _bounds(self._turning, share * calm.turn_speed, share * calm.turn_acceleration, dt)
-        move = _bounds(self._moving, share * calm.speed, share * calm.acceleration, dt)
-        return goal._replace(turn_low=turn[0], turn_high=turn[1], move_low=move[0], move_high=move[1])
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
@@ -173,7 +152,7 @@ class Planted:
             part = min(1.0, 2.0 * (k + 1) / PLACE_STEPS)
             position, rotation = start[0] + part * (goal - start[0]), yaw_matrix(part * turn)
             low, high = pose.q - PLACE_STEP, pose.q + PLACE_STEP
-            reach = Reach(0.0, low, high, low, high)
+            reach = Reach(PLACE_TIME, low, high, low, high)
             q = pose.q.copy()
             _, closed = self._solve(q, Plan(offset, 0.0, position, rotation, POSE), pose, feet, 1.0, reach)
             if closed:
@@ -181,23 +160,6 @@ class Planted:
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
         middle = heading(stride.planted_rot[0]) * 0.5
         R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
-        self._turning, self._moving = np.zeros(3), np.zeros(3)
+        self._sway.rest()
         stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
         return self._maker.hang(pose.q, 1, stride.planted_pos, stride.planted_rot)
-
-
-def _bounds(velocity: Array, speed: float, acceleration: float, dt: float) -> tuple[Array, Array]:
-    """Least and largest way (3,) in dt s of something that moves at ``velocity`` (3,)."""
-    coasting, change, most = velocity * dt, acceleration * dt * dt, speed * dt
-    low, high = np.maximum(coasting - change, -most), np.minimum(coasting + change, most)
-    return np.minimum(low, np.maximum(coasting - change, high)), np.maximum(high, np.minimum(coasting + change, low))
-
-
-def _may_stop(goal: LegGoal) -> LegGoal:
-    """The goal with a torso that may stop at once, as it must where a joint comes to its end."""
-    return goal._replace(
-        turn_low=np.minimum(goal.turn_low, 0.0),
-        turn_high=np.maximum(goal.turn_high, 0.0),
-        move_low=np.minimum(goal.move_low, 0.0),
-        move_high=np.maximum(goal.move_high, 0.0),
-    )

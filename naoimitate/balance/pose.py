@@ -10,7 +10,7 @@ from numba import njit
 
 from naoimitate.balance.legs import POSE, Legs, Stance, base_pose
 from naoimitate.balance.offset import normalised_offset
-from naoimitate.robot.kernel import center_of_mass, forward
+from naoimitate.robot.kernel import forward
 from naoimitate.robot.model import RobotModel, Tree
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +21,8 @@ class Pose:
     """A pose and what is derived from it.
 
     q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m, world. sole_pos: (2, 3) m, sole_rot: (2, 3, 3), world.
-    link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them.
+    link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them. centres: (J + 1, 3) m, of mass of
+    the links, in the world.
     """
 
     q: Array
@@ -32,6 +33,7 @@ class Pose:
     sole_rot: Array
     link_pos: Array
     link_rot: Array
+    centres: Array
 
     @property
     def soles_in_base(self) -> Array:
@@ -73,17 +75,36 @@ class PoseMaker:
 @njit(cache=True)
 def _hang(
     tree: Tree, legs: Legs, q: Array, side: int, stance_pos: Array, stance_rot: Array
-) -> tuple[Array, Array, Array, Array, Array, Array, Array]:
-    """Base rotation and position, CoM, soles' positions and rotations in the world; link frames in the base frame."""
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+    """The fields of ``Pose`` behind q."""
     n = q.shape[0]
     link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
     forward(tree, q, link_pos, link_rot)
-    R, p, com = np.empty((3, 3)), np.empty(3), np.empty(3)
+    R, p, com, mass = np.empty((3, 3)), np.empty(3), np.zeros(3), tree.mass.sum()
     base_pose(tree, legs, Stance(side, stance_pos, stance_rot, POSE, 0.0), link_pos, link_rot, R, p)
-    center_of_mass(tree, link_pos, link_rot, com)
+    centres = np.empty((n + 1, 3))
+    for link in range(n + 1):
+        _placed(link_pos[link], link_rot[link], tree.com[link], R, p, centres[link])
+        for a in range(3):
+            com[a] += tree.mass[link] / mass * centres[link, a]
     sole_pos, sole_rot = np.empty((2, 3)), np.empty((2, 3, 3))
     for k in range(2):
         row = legs.sole_joint[k] + 1
-        sole_pos[k] = p + R @ (link_pos[row] + link_rot[row] @ legs.sole_point[k])
-        sole_rot[k] = R @ link_rot[row]
-    return R, p, p + R @ com, sole_pos, sole_rot, link_pos, link_rot
+        _placed(link_pos[row], link_rot[row], legs.sole_point[k], R, p, sole_pos[k])
+        for a in range(3):
+            for b in range(3):
+                sole_rot[k, a, b] = 0.0
+                for c in range(3):
+                    sole_rot[k, a, b] += R[a, c] * link_rot[row, c, b]
+    return R, p, com, sole_pos, sole_rot, link_pos, link_rot, centres
+
+
+@njit(cache=True)
+def _placed(link_pos: Array, link_rot: Array, point: Array, R: Array, p: Array, out: Array) -> None:
+    """out (3,) m: a point of a link in the world."""
+    for a in range(3):
+        out[a] = p[a]
+    for b in range(3):
+        at = link_pos[b] + link_rot[b, 0] * point[0] + link_rot[b, 1] * point[1] + link_rot[b, 2] * point[2]
+        for a in range(3):
+            out[a] += R[a, b] * at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -43,11 +43,10 @@ class Footing:
         return place, wrap(self.headings[swing] - stance_yaw)
 
 
-@dataclass(frozen=True)
-class Reach:
+class Reach(NamedTuple):
     """What a frame's time allows: dt in s; joint angles (J,) rad within the speed limits, and within the accelerations.
 
-    smooth_low, smooth_high lie within low, high; they are kept wherever the feet allow it.
+    smooth_low, smooth_high lie within low, high; they are kept wherever the feet allow it. Read by compiled code too.
     """
 
     dt: float
@@ -76,6 +75,10 @@ class Retargeting(Protocol):
     @property
     def offset(self) -> float:
         """The robot's normalised offset, 0 left to 1 right."""
+
+    @property
+    def may_lift(self) -> bool:
+        """Whether the body has been where it belongs, at rest, for long enough to lift a foot."""
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support as near to the footing as the landing set allows, starting from q (J,) rad.

@@ -12,15 +12,22 @@ from naoimitate.balance.legs import FREE, POSE, REACH
 from naoimitate.balance.offset import OffsetLaw, advance
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Footing
+from naoimitate.balance.sway import ONE_FOOT, QUIET, TWO_FEET, SwayLimits
 from naoimitate.balance.swing import Phase, Swing, SwingSettings
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
-from naoimitate.fsm.support import OFFSET_REACHED
+from naoimitate.fsm.support import OFFSET_REACHED, wanted_stance
 
 Array = npt.NDArray[np.float64]
 
 LIFT_STILL = 0.1
 """[s] for which the offset has been where it belongs before a foot is lifted: the servos have unloaded it by then."""
+COM_LATE = 0.003
+"""[m] by which the CoM may be off its place before the offset waits for it..."""
+PATIENCE = 0.15
+"""[s] ...and the time in which as much again is let pass: a CoM that cannot get there must not wait for ever."""
+ONE_SIDED = 0.1
+"""Share of the weight on a foot below which the other one stands alone."""
 _KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
 
 
@@ -29,7 +36,8 @@ class Plan:
     """What one frame asks of the legs.
 
     offset, offset_speed: the normalised offset to reach and its speed, 1/s. sole_pos (3,), sole_rot (3, 3): pose of the
-    sole on which the base does not hang. kind, min_height: as in ``legs.Stance``. touchdown: the step ends with the
+    sole on which the base does not hang. kind, min_height: as in ``legs.Stance``. sway: how
+    much the body may move. touchdown: the step ends with the
     foot on the floor. clipped: the landing place is not the human's.
     """
 
@@ -38,6 +46,7 @@ class Plan:
     sole_pos: Array
     sole_rot: Array
     kind: int
+    sway: SwayLimits = TWO_FEET
     min_height: float = 0.0
     touchdown: bool = False
     clipped: bool = False
@@ -55,7 +64,7 @@ class Stride:
         self._fsm = SupportFsm()
         self.planted_pos, self.planted_rot = planted_pos.copy(), planted_rot.copy()
         self.offset, self._offset_speed = offset, 0.0
-        self.side, self._still = 1, 0.0
+        self.side, self._still, self._waited = 1, 0.0, 0.0
         self._swing: Swing | None = None
         self._good = self._can_stand_on_both()
 
@@ -69,8 +78,16 @@ class Stride:
         """Whether one foot does not carry."""
         return self.mode is not Mode.DOUBLE
 
-    def plan(self, pose: Pose, footing: Footing, dt: float) -> Plan:
-        """Advance the support machine, the offset and the swing foot by dt s from the present pose."""
+    @property
+    def may_lift(self) -> bool:
+        """Whether the offset has been where it belongs, and the body at rest, for long enough to lift a foot."""
+        return self._still > LIFT_STILL
+
+    def plan(self, pose: Pose, footing: Footing, calm: bool, dt: float) -> Plan:
+        """Advance the support machine, the offset and the swing foot by dt s from the present pose.
+
+        calm: whether the body moves little enough for a foot to be lifted.
+        """
         before = self.mode
         given = SupportInput(
             human=footing.support,
@@ -78,21 +95,31 @@ class Stride:
             descending=self._swing is not None and self._swing.phase is Phase.DESCEND,
             stance_ok=(True, True) if self.swinging else self._stance_ok(),
             ahead=footing.ahead,
-            may_lift=footing.may_lift and self._still > LIFT_STILL,
+            may_lift=footing.may_lift and self.may_lift,
         )
         if self._fsm.step(given) is not before:
             self._changed(before)
         target = offset_target(self.mode, given, footing.offset)
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         limit = self._law.acceleration(float(np.hypot(*(right - left)[:2])), float(pose.com[2]))
-        there = abs(self.offset - target) < OFFSET_REACHED
-        self._still = self._still + dt if there and not self.swinging else 0.0
-        offset, speed = advance(self.offset, self._offset_speed, target, dt, self._law, limit)
+        late = self._is_late(pose, dt)
+        there = abs(self.offset - target) < OFFSET_REACHED and not late
+        self._still = self._still + dt if there and calm and not self.swinging else 0.0
+        wanted = self.offset if late else target
+        offset, speed = advance(self.offset, self._offset_speed, wanted, dt, self._law, limit)
         if self._swing is None:
             self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)
             other = 1 - self.side
-            return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE)
+            lifting = there and (given.ahead or wanted_stance(self.mode, given) != "D")
+            sway = QUIET if lifting else self._sway_on_both()
+            return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE, sway)
         return self._swing_plan(self._swing, pose, footing, (offset, speed), dt)
+
+    def _is_late(self, pose: Pose, dt: float) -> bool:
+        """Whether the CoM is behind its place; for longer and longer only if it is farther and farther."""
+        error = float(np.hypot(*(pose.com[:2] - self.com_goal(self.offset))))
+        self._waited = self._waited + dt if error > COM_LATE else 0.0
+        return error > COM_LATE * (1.0 + self._waited / PATIENCE)
 
     def _swing_plan(self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float], dt: float) -> Plan:
         foot = 1 - self.side
@@ -102,8 +129,12 @@ class Stride:
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
-        kind = _KINDS[swing.phase]
-        return Plan(*offset, position, rotation, kind, swing.min_height, down, clipped and self.mode.landing)
+        kind, sway = _KINDS[swing.phase], ONE_FOOT if swing.phase in (Phase.FREE, Phase.APPROACH) else QUIET
+        return Plan(*offset, position, rotation, kind, sway, swing.min_height, down, clipped and self.mode.landing)
+
+    def _sway_on_both(self) -> SwayLimits:
+        """Two feet of which one carries next to nothing are as one."""
+        return TWO_FEET if ONE_SIDED < self.offset < 1.0 - ONE_SIDED else ONE_FOOT
 
     def _landing_wish(self, swing: Swing, footing: Footing) -> tuple[Array, float]:
         """Where the person's foot is; more and more the middle of the landing set when it cannot get down there."""

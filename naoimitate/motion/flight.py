@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.core.frames import LANDMARK, SIDES, Array
+from naoimitate.core.physics import GRAVITY
 from naoimitate.human.segments import center_of_mass
 
-GRAVITY = 9.81
-"""m/s^2."""
 CLEAR = 0.10
 """m: feet that are this far above their floor do not touch it."""
 HANDS_CLEAR = 0.25

@@ -106,6 +106,68 @@ def angular_jacobian(tree: Tree, pos: Array, rot: Array, joint: int, out: Array)
 
 
 @njit(cache=True)
+def joint_axes(tree: Tree, rot: Array, out: Array) -> None:
+    """Fill out (3, J): the unit axes of all joints."""
+    for k in range(tree.parent.shape[0]):
+        out[0, k], out[1, k], out[2, k] = _axis(tree, rot, k)
+
+
+@njit(cache=True)
+def composite_bodies(tree: Tree, pos: Array, rot: Array, about: Array, out: Array) -> None:
+    """Fill out (J + 1, 10): mass and moments about a point (3,) m of all that joint j moves, row j + 1; row 0: all.
+
+    Links count as point masses, with shares of the total mass: m, first moments s (3,) m, then xx, yy, zz, xy, xz, yz
+    of the inertia sum m (|r|^2 E - r r^T), m^2.
+    """
+    total = tree.mass.sum()
+    out[:] = 0.0
+    for link in range(tree.parent.shape[0], -1, -1):
+        x, y, z = (
+            _along(tree, pos, rot, link, 0) - about[0],
+            _along(tree, pos, rot, link, 1) - about[1],
+            _along(tree, pos, rot, link, 2) - about[2],
+        )
+        m, row = tree.mass[link] / total, out[link]
+        row[0] += m
+        row[1] += m * x
+        row[2] += m * y
+        row[3] += m * z
+        row[4] += m * (y * y + z * z)
+        row[5] += m * (x * x + z * z)
+        row[6] += m * (x * x + y * y)
+        row[7] -= m * x * y
+        row[8] -= m * x * z
+        row[9] -= m * y * z
+        if link > 0:
+            above = out[tree.parent[link - 1] + 1]
+            for i in range(10):
+                above[i] += row[i]
+
+
+@njit(cache=True)
+def momentum_of(
+    body: Array, wx: float, wy: float, wz: float, vx: float, vy: float, vz: float
+) -> tuple[float, float, float]:
+    """Angular momentum I w + s x v of a composite body that turns at w about the point, which moves along at v."""
+    return (
+        body[4] * wx + body[7] * wy + body[8] * wz + body[2] * vz - body[3] * vy,
+        body[7] * wx + body[5] * wy + body[9] * wz + body[3] * vx - body[1] * vz,
+        body[8] * wx + body[9] * wy + body[6] * wz + body[1] * vy - body[2] * vx,
+    )
+
+
+@njit(cache=True)
+def moment_jacobian(axes: Array, pos: Array, bodies: Array, about: Array, out: Array) -> None:
+    """Fill out (3, J) m^2: angular momentum about the point of ``composite_bodies``, per joint speed and total mass."""
+    for k in range(axes.shape[1]):
+        x, y, z = axes[0, k], axes[1, k], axes[2, k]
+        dx, dy, dz = about[0] - pos[k + 1, 0], about[1] - pos[k + 1, 1], about[2] - pos[k + 1, 2]
+        out[0, k], out[1, k], out[2, k] = momentum_of(
+            bodies[k + 1], x, y, z, y * dz - z * dy, z * dx - x * dz, x * dy - y * dx
+        )
+
+
+@njit(cache=True)
 def _axis(tree: Tree, rot: Array, k: int) -> tuple[float, float, float]:
     """Axis of joint k in the base frame; it is the same vector in the frames before and behind the joint."""
     x, y, z = tree.axis[k, 0], tree.axis[k, 1], tree.axis[k, 2]

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from naoimitate.balance.offset import OffsetLaw
-from naoimitate.balance.stride import LIFT_STILL
 from naoimitate.core.frames import Motion
 from naoimitate.fsm import Mode
 from naoimitate.fsm.support import OFFSET_REACHED
@@ -69,7 +68,7 @@ class ConstantPace:
     def __init__(self, motion: Motion, start: float, factor: float) -> None:
         self._motion, self._factor, self.time = motion, factor, start
 
-    def next(self, dt: float, mode: Mode, offset: float, lag: float) -> Moment:
+    def next(self, dt: float, mode: Mode, offset: float, lag: float, may_lift: bool = True) -> Moment:
         """The moment dt s later."""
         self.time += self._factor * dt
         return Moment(self.time, self._motion.at(self.time).support or "D", "")
@@ -81,17 +80,16 @@ class AutoPace:
     def __init__(self, motion: Motion, start: float, law: OffsetLaw, settings: PaceSettings | None = None) -> None:
         self._phases, self._law, self._s = phases(motion), law, settings or PaceSettings()
         self._index = max(i for i, p in enumerate(self._phases) if p.start <= start or i == 0)
-        self._rate, self._waited, self._ready_for = 0.0, 0.0, 0.0
+        self._rate, self._waited = 0.0, 0.0
         self._shift = _shift_times(law)
         self.time = start
 
-    def next(self, dt: float, mode: Mode, offset: float, lag: float) -> Moment:
-        """Advance by at most dt s, given the robot's support mode, its offset, and its lag in m."""
+    def next(self, dt: float, mode: Mode, offset: float, lag: float, may_lift: bool = True) -> Moment:
+        """Advance by at most dt s, given the robot's support mode, offset, lag in m, and whether it may lift a foot."""
         phase = self._phases[self._index]
         coming = self._coming()
-        self._ready_for = self._ready_for + dt if coming is not None and _ready(coming.support, mode, offset) else 0.0
-        still = mode is not Mode.DOUBLE or self._ready_for > LIFT_STILL
-        ready = coming is None or (self._ready_for > 0.0 and still) or self._waited > self._s.patience
+        can = may_lift or mode is not Mode.DOUBLE
+        ready = coming is None or (can and _ready(coming.support, mode, offset)) or self._waited > self._s.patience
         landed = phase.support != "D" or mode is Mode.DOUBLE or self._waited > self._s.patience
         stop = math.inf
         if not landed:

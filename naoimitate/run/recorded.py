@@ -127,7 +127,7 @@ def _play(
     moments, step_times = [first], [0.0]
     longest = 60.0 + LONGEST * (last - first)
     while law.time < last - 1e-9 and commands[-1].time < longest:
-        moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag)
+        moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag, imitator.may_lift)
         begin = clock.perf_counter()
         commands.append(imitator.step(motion.at(moment.time), dt, support=moment.support, ahead=moment.ahead))
         step_times.append(clock.perf_counter() - begin)

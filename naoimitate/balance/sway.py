@@ -1,0 +1,114 @@
+"""How far a step may throw the zero moment point: bounds on the whole body's momentum.
+
+With K the angular momentum per mass about a point of the floor under the CoM, links as point masses, the zero moment
+point lies (dK_y/dt, -dK_x/dt) / g from the CoM's projection while the CoM's height is steady (Moulard 2013, the full
+multi-body formula). A step of dt may therefore change K dt by g d dt^2 for a shift of d.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from naoimitate.balance.pose import Pose
+from naoimitate.core.geometry import rotation_vector
+from naoimitate.core.physics import GRAVITY
+from naoimitate.robot.model import RobotModel
+
+Array = npt.NDArray[np.float64]
+
+
+LOWEST = 0.05
+"""[m] of the CoM's height that the pendulum is taken to have at least."""
+
+
+class SwayLimits(NamedTuple):
+    """What a body may do on soft legs; the defaults are for two feet that share the weight."""
+
+    zmp: float = 0.015
+    """[m] by which a step may move the zero moment point off the CoM's projection, forwards and sideways."""
+    drift: float = 0.030
+    """[m] by which the body's momentum may carry its CoM after the feet stop it, of the capture point: what is bounded
+    in its change alone gathers speed until it meets a bound that stops it at once."""
+    speed: float = 0.2
+    """[m/s] of the torso."""
+    acceleration: float = 1.5
+    """[m/s^2] of the torso."""
+    turn_speed: float = 1.0
+    """[rad/s] of the torso."""
+    turn_acceleration: float = 8.0
+    """[rad/s^2] of the torso: what its inertia asks, soft hips have to give."""
+
+
+TWO_FEET = SwayLimits()
+ONE_FOOT = SwayLimits(0.012, 0.006, 0.1, 0.75, 0.5, 4.0)
+QUIET = SwayLimits(0.008, 0.004, 0.04, 0.75, 0.2, 4.0)
+"""Around a lift-off and a touchdown: millimetres of sway are a foot that carries too early or too long."""
+
+
+class Sway:
+    """What the body's momentum was, and what the next step may make of it."""
+
+    def __init__(self, robot: RobotModel) -> None:
+        self._mass = robot.tree.mass / robot.tree.mass.sum()
+        self._speed, self._torso = np.zeros((len(self._mass), 3)), np.zeros(6)
+
+    def rest(self) -> None:
+        """The body stands still."""
+        self._speed[:], self._torso[:] = 0.0, 0.0
+
+    @property
+    def calm(self) -> bool:
+        """Whether the torso moves as little as it must around a lift-off."""
+        way, turn = math.hypot(*self._torso[:3]), math.hypot(*self._torso[3:])
+        return way < 2.0 * QUIET.speed and turn < 2.0 * QUIET.turn_speed
+
+    def accept(self, before: Pose, pose: Pose, dt: float) -> None:
+        """The body has gone from one pose to another in dt s."""
+        self._speed = (pose.centres - before.centres) / dt
+        self._torso[:3] = (pose.base_pos - before.base_pos) @ before.base_rot / dt
+        self._torso[3:] = rotation_vector(before.base_rot.T @ pose.base_rot) / dt
+
+    def bounds(self, pose: Pose, arms: Pose, limits: SwayLimits, dt: float) -> tuple[Array, Array, Array]:
+        """What the legs may add in the next dt s: the point (3,) m on the floor, lowest and highest (8,), ``LegGoal``.
+
+        arms: the pose with the arms where they will be, and the legs as they were.
+        """
+        return _bounds(self._mass, self._speed, self._torso, pose.com, pose.centres, arms.centres, limits, dt)
+
+
+@njit(cache=True)
+def _bounds(
+    mass: Array, speed: Array, torso: Array, com: Array, here: Array, arms: Array, limits: SwayLimits, dt: float
+) -> tuple[Array, Array, Array]:
+    about = np.array([com[0], com[1], 0.0])
+    coasting, arms_way, low, high = np.empty(8), np.zeros(8), np.empty(8), np.empty(8)
+    _moment(mass, here, speed * dt, about, coasting)
+    _moment(mass, here, arms - here, about, arms_way)
+    coasting[2:] = torso * dt
+    momentum = math.sqrt(GRAVITY * max(com[2], LOWEST)) * limits.drift
+    for i in range(8):
+        most, change = momentum, GRAVITY * limits.zmp
+        if 2 <= i < 5:
+            most, change = limits.speed, limits.acceleration
+        elif i >= 5:
+            most, change = limits.turn_speed, limits.turn_acceleration
+        slowest, fastest = coasting[i] - change * dt * dt, coasting[i] + change * dt * dt
+        low[i], high[i] = max(slowest, -most * dt), min(fastest, most * dt)
+        low[i], high[i] = min(low[i], max(slowest, high[i])), max(high[i], min(fastest, low[i]))
+        low[i], high[i] = low[i] - arms_way[i], high[i] - arms_way[i]
+    return about, low, high
+
+
+@njit(cache=True)
+def _moment(mass: Array, here: Array, way: Array, about: Array, out: Array) -> None:
+    """First two of out: moment about x and y per mass, m^2, of links at (J + 1, 3) m that go (J + 1, 3) m."""
+    out[:2] = 0.0
+    for link in range(here.shape[0]):
+        x, y, z = here[link, 0] - about[0], here[link, 1] - about[1], here[link, 2] - about[2]
+        out[0] += mass[link] * (y * way[link, 2] - z * way[link, 1])
+        out[1] += mass[link] * (z * way[link, 0] - x * way[link, 2])

@@ -1,0 +1,69 @@
+"""Sway: what a step may do to the zero moment point."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from naoimitate.balance.legs import LegLimits, build_legs
+from naoimitate.balance.pose import Pose, PoseMaker
+from naoimitate.balance.sway import ONE_FOOT, QUIET, TWO_FEET, Sway, SwayLimits
+from naoimitate.core.physics import GRAVITY
+from naoimitate.robot.model import RobotModel
+
+DT = 0.01
+
+
+def lifted(pose: Pose, way: np.ndarray) -> Pose:
+    """The whole robot elsewhere."""
+    return Pose(
+        pose.q, pose.base_rot, pose.base_pos + way, pose.com + way, pose.sole_pos + way, pose.sole_rot, pose.link_pos,
+        pose.link_rot, pose.centres + way,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def pose(robot: RobotModel) -> Pose:
+    return PoseMaker(robot, build_legs(robot, LegLimits())).stand(robot.postures["stand"].copy())
+
+
+def test_a_body_at_rest_may_start_as_fast_as_the_zero_moment_point_allows(robot: RobotModel, pose: Pose) -> None:
+    about, low, high = Sway(robot).bounds(pose, pose, TWO_FEET, DT)
+    assert about == pytest.approx([pose.com[0], pose.com[1], 0.0])
+    assert high[:2] == pytest.approx(GRAVITY * TWO_FEET.zmp * DT**2)
+    assert low == pytest.approx(-high)
+
+
+def test_the_bound_is_the_inverted_pendulum_for_a_body_that_moves_as_one(robot: RobotModel, pose: Pose) -> None:
+    """A step with the largest change of momentum about y, all links alike, moves the ZMP by just the bound: a z / g."""
+    _, _, high = Sway(robot).bounds(pose, pose, TWO_FEET, DT)
+    acceleration = high[1] / pose.com[2] / DT**2
+    assert acceleration * pose.com[2] / GRAVITY == pytest.approx(TWO_FEET.zmp)
+
+
+def test_what_moves_may_go_on_and_need_not_stop_at_once(robot: RobotModel, pose: Pose) -> None:
+    sway, speed = Sway(robot), 0.5
+    sway.accept(lifted(pose, np.array([-speed * DT, 0.0, 0.0])), pose, DT)
+    _, low, high = sway.bounds(pose, pose, ONE_FOOT, DT)
+    coasting = speed * DT * pose.com[2]
+    assert low[1] <= high[1] < coasting, "faster than allowed: it has to brake"
+    assert coasting - high[1] == pytest.approx(GRAVITY * ONE_FOOT.zmp * DT**2)
+    assert not sway.calm
+    sway.rest()
+    assert sway.calm
+    assert sway.bounds(pose, pose, ONE_FOOT, DT)[2] == pytest.approx(-sway.bounds(pose, pose, ONE_FOOT, DT)[1])
+
+
+def test_what_the_arms_do_is_left_to_the_legs_to_make_up_for(robot: RobotModel, pose: Pose) -> None:
+    maker, q = PoseMaker(robot, build_legs(robot, LegLimits())), pose.q.copy()
+    q[robot.chains["l_arm"][0]] += 0.05
+    arms = maker.stand(q)
+    still, moved = Sway(robot).bounds(pose, pose, TWO_FEET, DT), Sway(robot).bounds(pose, arms, TWO_FEET, DT)
+    assert np.abs(moved[1][:2] - still[1][:2]).max() > 1e-6
+    assert moved[2] - moved[1] == pytest.approx(still[2] - still[1])
+    assert moved[1][2:] == pytest.approx(still[1][2:])
+
+
+@pytest.mark.parametrize("tight, wide", [(QUIET, ONE_FOOT), (ONE_FOOT, TWO_FEET)])
+def test_fewer_feet_and_a_coming_step_allow_less(tight: SwayLimits, wide: SwayLimits) -> None:
+    assert all(a <= b for a, b in zip(tight, wide, strict=True))
