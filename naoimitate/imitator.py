@@ -22,11 +22,11 @@ from naoimitate.balance.stride import Stride
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import CalibrationError
 from naoimitate.core.frames import GivenUp, HumanFrame, RobotCommand
-from naoimitate.core.geometry import heading, quat_from_matrix
+from naoimitate.core.geometry import heading, lengths, quat_from_matrix
 from naoimitate.fsm import Mode
 from naoimitate.gate import Gate
 from naoimitate.human.observer import Observation, Observer
-from naoimitate.limits import Follower, limited_step
+from naoimitate.limits import Follower, limited_step, reachable_angles
 from naoimitate.mapping import Mapping, reachable_mapping, virtual_mapping
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import Settings
@@ -57,6 +57,7 @@ class Imitator:
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
         self._pose: Pose | None = None
+        self._acceleration = np.where(legs.variable >= 0, s.limits.leg_acceleration, s.limits.arm_acceleration)
         self._hurried: Array = np.zeros(2)
         self._unreached: Array = np.full(2, np.inf)
 
@@ -119,8 +120,8 @@ class Imitator:
 
     def _within_reach(self, targets: Array) -> Array:
         """Targets (4, 3) m, those brought back that are too far off to be meant: the solvers work with short ways."""
-        lengths = np.linalg.norm(targets, axis=1)
-        return np.asarray(targets * np.minimum(1.0, self._farthest / np.maximum(lengths, 1e-9))[:, None])
+        far = lengths(targets) / self._farthest
+        return targets if far.max() <= 1.0 else np.asarray(targets / np.maximum(far, 1.0)[:, None])
 
     def _advance(
         self, pose: Pose, seen: Observation, targets: Array, footing: Footing, dt: float
@@ -134,7 +135,7 @@ class Imitator:
         self._arms.head(q, seen.head, self.settings.limits.head_speed * dt, reach.low, reach.high)
         hurried = [self._arms.hurried(side, q, reach) for side in (0, 1)]
         answer = self._retargeting.step(pose, q, feet, footing, reach)
-        missed = np.linalg.norm(hands - self._arms.hands(answer.pose), axis=1)
+        missed = lengths(hands - self._arms.hands(answer.pose))
         self._unreached = np.where(hurried, np.minimum(self._unreached, missed), missed)
         self._hurried = missed - self._unreached
         self._pose = answer.pose
@@ -146,16 +147,13 @@ class Imitator:
 
     def _reach(self, pose: Pose, dt: float) -> Reach:
         """The joint angles that a frame of dt s allows after a pose: by speed, by acceleration with room to stop."""
-        limits = self.settings.limits
-        turn = self.robot.speed * (limits.joint_share * dt)
-        low, high = pose.q - turn, pose.q + turn
-        acceleration = np.where(self._legs.variable >= 0, limits.leg_acceleration, limits.arm_acceleration)
-        coasting, change = pose.q + self._velocity * dt, acceleration * dt * dt
-        brake_low = pose.q - dt * np.sqrt(2.0 * acceleration * np.maximum(pose.q - self._legs.lower, 0.0))
-        brake_high = pose.q + dt * np.sqrt(2.0 * acceleration * np.maximum(self._legs.upper - pose.q, 0.0))
-        smooth_low = np.clip(np.maximum(coasting - change, brake_low), low, np.minimum(high, brake_high))
-        smooth_high = np.clip(np.minimum(coasting + change, brake_high), np.maximum(low, brake_low), high)
-        return Reach(dt, low, high, smooth_low, smooth_high)
+        legs, share = self._legs, self.settings.limits.joint_share
+        return Reach(
+            dt,
+            *reachable_angles(
+                pose.q, self._velocity, legs.lower, legs.upper, self.robot.speed * share, self._acceleration, dt
+            ),
+        )
 
     def _feet_step(self, pose: Pose, targets: Array, dt: float) -> Array:
         """Where to ask the feet to be next, hip to sole in the torso frame (2, 3) m: limited from where they are.
@@ -214,8 +212,8 @@ class Imitator:
         missed = GivenUp(0) if seen.complete else GivenUp.INPUT
         if footing.support != self.mode.stance:
             missed |= GivenUp.SUPPORT
-        hands = np.linalg.norm(targets[HANDS] - self._arms.hands(pose), axis=1)
-        feet = np.linalg.norm(targets[FEET] - pose.soles_in_base + self._hips, axis=1)
+        hands = lengths(targets[HANDS] - self._arms.hands(pose))
+        feet = lengths(targets[FEET] - pose.soles_in_base + self._hips)
         for side in (0, 1):
             if hands[side] > NOTICEABLE:
                 near = self._arms.touches(side, self._clearance)
@@ -250,7 +248,7 @@ class Imitator:
     def lag(self) -> float:
         """How far (m) the hands and a swing foot are behind their targets at their speed limits."""
         feet = self._feet.behind[[self.mode.stance == "R", self.mode.stance == "L"]]
-        return float(np.concatenate([self._hands.behind, self._hurried, feet]).max())
+        return float(max(self._hands.behind.max(), self._hurried.max(), feet.max(initial=0.0)))
 
     def _command(self, seen: Observation, footing: Footing, given_up: GivenUp, iterations: int) -> RobotCommand:
         pose = self._pose

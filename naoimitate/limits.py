@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from naoimitate.core.geometry import lengths
+
 Array = npt.NDArray[np.float64]
 
 
@@ -64,13 +66,33 @@ class Follower:
     @property
     def behind(self) -> Array:
         """Distance (K,) m of the points to the targets they were last given."""
-        return np.asarray(np.linalg.norm(self._target - self.position, axis=1))
+        return lengths(self._target - self.position)
 
     def restart(self, position: Array) -> None:
         """Stand still at a position, after a held frame."""
         self.position[:] = position
         self._target[:] = position
         self.velocity[:] = 0.0
+
+
+@njit(cache=True)
+def reachable_angles(
+    q: Array, velocity: Array, lower: Array, upper: Array, speed: Array, acceleration: Array, dt: float
+) -> tuple[Array, Array, Array, Array]:
+    """Joint angles (J,) rad that dt s allow from q at a velocity (J,) rad/s: low, high, smooth low, smooth high.
+
+    low and high are due to speed (J,) rad/s alone; the smooth ones also to acceleration (J,) rad/s^2, with room to stop
+    before the limits lower and upper (J,) rad.
+    """
+    low, high = q - speed * dt, q + speed * dt
+    smooth_low, smooth_high = np.empty_like(q), np.empty_like(q)
+    for j in range(q.shape[0]):
+        coasting, change = q[j] + velocity[j] * dt, acceleration[j] * dt * dt
+        brake_low = q[j] - dt * math.sqrt(2.0 * acceleration[j] * max(q[j] - lower[j], 0.0))
+        brake_high = q[j] + dt * math.sqrt(2.0 * acceleration[j] * max(upper[j] - q[j], 0.0))
+        smooth_low[j] = min(max(coasting - change, brake_low, low[j]), high[j], brake_high)
+        smooth_high[j] = max(min(coasting + change, brake_high, high[j]), low[j], brake_low)
+    return low, high, smooth_low, smooth_high
 
 
 @njit(cache=True)

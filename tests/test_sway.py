@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,10 +18,13 @@ DT = 0.01
 
 def lifted(pose: Pose, way: np.ndarray) -> Pose:
     """The whole robot elsewhere."""
-    return Pose(
-        pose.q, pose.base_rot, pose.base_pos + way, pose.com + way, pose.sole_pos + way, pose.sole_rot, pose.link_pos,
-        pose.link_rot, pose.centres + way,
-    )  # fmt: skip
+    return replace(
+        pose,
+        base_pos=pose.base_pos + way,
+        com=pose.com + way,
+        sole_pos=pose.sole_pos + way,
+        centres=pose.centres + way,
+    )
 
 
 @pytest.fixture

@@ -45,6 +45,7 @@ class Clearance:
         self._tree, self._settings = robot.tree, settings
         self._shapes = shape_arrays(robot)
         self._pairs = np.ascontiguousarray(robot.pairs)
+        self._looked_at: Pose | None = None
         count = len(robot.pairs)
         self._d, self._normal = np.empty(count), np.empty((count, 3))
         self._a, self._b = np.empty((count, 3)), np.empty((count, 3))
@@ -53,7 +54,10 @@ class Clearance:
         self._not_foot = np.array([shape.joint not in feet for shape in robot.shapes])
 
     def look(self, pose: Pose) -> None:
-        """Measure a pose."""
+        """Measure a pose, if it is another one than before."""
+        if pose is self._looked_at:
+            return
+        self._looked_at = pose
         distances(
             self._shapes,
             self._pairs,

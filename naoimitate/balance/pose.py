@@ -20,7 +20,8 @@ Array = npt.NDArray[np.float64]
 class Pose:
     """A pose and what is derived from it.
 
-    q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m, world. sole_pos: (2, 3) m, sole_rot: (2, 3, 3), world.
+    q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m. sole_pos: (2, 3) m, sole_rot: (2, 3, 3). In the world.
+    soles_in_base: (2, 3) m, the soles' places in the torso frame.
     link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them. centres: (J + 1, 3) m, of mass of
     the links, in the world.
     """
@@ -31,14 +32,10 @@ class Pose:
     com: Array
     sole_pos: Array
     sole_rot: Array
+    soles_in_base: Array
     link_pos: Array
     link_rot: Array
     centres: Array
-
-    @property
-    def soles_in_base(self) -> Array:
-        """Positions of the soles in the torso frame, (2, 3) m."""
-        return np.asarray((self.sole_pos - self.base_pos) @ self.base_rot)
 
 
 class PoseMaker:
@@ -58,8 +55,7 @@ class PoseMaker:
 
     def centres(self, sole_pos: Array, sole_rot: Array) -> Array:
         """Centroids of the sole outlines in the world, (2, 3) m: the foot centres of (6)."""
-        c = self._legs.centre
-        return np.asarray(sole_pos + sole_rot[:, :, 0] * c[:, :1] + sole_rot[:, :, 1] * c[:, 1:])
+        return _centres(self._legs.centre, sole_pos, sole_rot)
 
     def lowest(self, pose: Pose) -> float:
         """Height of the lowest point of both sole outlines, m."""
@@ -75,7 +71,7 @@ class PoseMaker:
 @njit(cache=True)
 def _hang(
     tree: Tree, legs: Legs, q: Array, side: int, stance_pos: Array, stance_rot: Array
-) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array]:
     """The fields of ``Pose`` behind q."""
     n = q.shape[0]
     link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
@@ -87,16 +83,18 @@ def _hang(
         _placed(link_pos[link], link_rot[link], tree.com[link], R, p, centres[link])
         for a in range(3):
             com[a] += tree.mass[link] / mass * centres[link, a]
-    sole_pos, sole_rot = np.empty((2, 3)), np.empty((2, 3, 3))
+    sole_pos, sole_rot, soles_in_base = np.empty((2, 3)), np.empty((2, 3, 3)), np.empty((2, 3))
+    here, upright = np.zeros(3), np.eye(3)
     for k in range(2):
         row = legs.sole_joint[k] + 1
         _placed(link_pos[row], link_rot[row], legs.sole_point[k], R, p, sole_pos[k])
+        _placed(link_pos[row], link_rot[row], legs.sole_point[k], upright, here, soles_in_base[k])
         for a in range(3):
             for b in range(3):
                 sole_rot[k, a, b] = 0.0
                 for c in range(3):
                     sole_rot[k, a, b] += R[a, c] * link_rot[row, c, b]
-    return R, p, com, sole_pos, sole_rot, link_pos, link_rot, centres
+    return R, p, com, sole_pos, sole_rot, soles_in_base, link_pos, link_rot, centres
 
 
 @njit(cache=True)
@@ -108,3 +106,12 @@ def _placed(link_pos: Array, link_rot: Array, point: Array, R: Array, p: Array, 
         at = link_pos[b] + link_rot[b, 0] * point[0] + link_rot[b, 1] * point[1] + link_rot[b, 2] * point[2]
         for a in range(3):
             out[a] += R[a, b] * at
+
+
+@njit(cache=True)
+def _centres(centre: Array, sole_pos: Array, sole_rot: Array) -> Array:
+    out = np.empty((2, 3))
+    for k in range(2):
+        for a in range(3):
+            out[k, a] = sole_pos[k, a] + sole_rot[k, a, 0] * centre[k, 0] + sole_rot[k, a, 1] * centre[k, 1]
+    return out

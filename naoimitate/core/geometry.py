@@ -15,6 +15,15 @@ Array = npt.NDArray[np.float64]
 
 
 @njit(cache=True)
+def lengths(v: Array) -> Array:
+    """Lengths (K,) of vectors (K, 3)."""
+    out = np.empty(v.shape[0])
+    for k in range(v.shape[0]):
+        out[k] = math.sqrt(v[k, 0] * v[k, 0] + v[k, 1] * v[k, 1] + v[k, 2] * v[k, 2])
+    return out
+
+
+@njit(cache=True)
 def quat_from_matrix(R: Array) -> Array:
     """Unit quaternion (4,) with w >= 0 of a rotation matrix (3, 3) (Shepperd's method: divides by the largest)."""
     q = np.empty(4)
