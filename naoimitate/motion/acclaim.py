@@ -22,6 +22,8 @@ from naoimitate.motion.text import damaged, decode
 
 INCH = 0.0254
 """m; ASF lengths are inches times the header's ``length``."""
+ROOT_ORDER = ("tx", "ty", "tz", "rx", "ry", "rz")
+"""The root's numbers where the skeleton does not say their order."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,12 @@ class _Bone:
 
 @dataclass(frozen=True)
 class _Asf:
+    """parent: of each bone. order: of the root's six numbers. axis: order of its rotations. length: unit, inches."""
+
     bones: dict[str, _Bone]
     parent: dict[str, str]
+    order: tuple[str, ...]
+    axis: str
     length: float
     degrees: bool
 
@@ -92,7 +98,11 @@ def _parse_asf(text: str) -> _Asf:
         degrees = units.get("angle", "deg").lower().startswith("deg")
         bones = dict(_bone(block, degrees) for block in _blocks(sections[":bonedata"]))
         parent = {child: words[0] for words in sections[":hierarchy"] for child in words[1:]}
-        asf = _Asf(bones, parent, float(units.get("length", 1.0)), degrees)
+        root = {words[0].lower(): [w.lower() for w in words[1:]] for words in sections.get(":root", [])}
+        order, axis = tuple(root.get("order", ROOT_ORDER)), root.get("axis", ["xyz"])[0]
+        if sorted(order) != sorted(ROOT_ORDER) or sorted(axis) != ["x", "y", "z"]:
+            raise ValueError("root")
+        asf = _Asf(bones, parent, order, axis, float(units.get("length", 1.0)), degrees)
     except (KeyError, ValueError, IndexError, StopIteration) as error:
         raise MotionFormatError(f"the ASF skeleton is damaged ({error}): get the complete file") from error
     if not bones or not np.isfinite([b.offset for b in bones.values()]).all() or not np.isfinite(asf.length):
@@ -194,8 +204,8 @@ def _channels(asf: _Asf, frames: list[dict[str, list[float]]], names: list[str],
     """Root positions (T, 3) and rotations of the nodes against their parents (T, J, 3, 3)."""
     table = {name: np.array([frame[name] for frame in frames]) for name in _usual_shape(frames)}
     local = np.tile(np.eye(3), (len(frames), len(names), 1, 1))
-    root = _padded(table["root"], 6)
-    local[:, 0] = _turns("XYZ", root[:, 3:6], degrees)
+    root = _padded(table["root"], 6)[:, [asf.order.index(name) for name in ROOT_ORDER]]
+    local[:, 0] = _turns(asf.axis, root[:, 3:], degrees)
     for i, name in enumerate(names[1:], 1):
         if name not in table or not name:
             continue
@@ -218,7 +228,7 @@ def _turns(order: str, xyz: Array, degrees: bool) -> Array:
     """Rotations (T, 3, 3) of angles about fixed axes, taken in the given order; NaN where an angle is not finite."""
     good = np.isfinite(xyz).all(axis=1)
     turned = np.full((len(xyz), 3, 3), np.nan)
-    columns = ["XYZ".index(a) for a in order]
+    columns = ["xyz".index(a) for a in order.lower()]
     if good.any():
         turned[good] = Rotation.from_euler(order.lower(), xyz[good][:, columns], degrees=degrees).as_matrix()
     return turned

@@ -15,6 +15,7 @@ CMU_UNIT = 0.0254 / 0.45
 """m; CMU's skeletons are in inches times 0.45 (header of its ASF files)."""
 UNITS = {
     "metres": 1.0,
+    "decimetres": 0.1,
     "centimetres": 0.01,
     "millimetres": 0.001,
     "inches": 0.0254,

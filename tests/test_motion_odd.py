@@ -1,0 +1,218 @@
+"""Files of odd but legal shape: the same person comes back, whoever wrote them and however."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+
+import motion_texts
+import numpy as np
+import pytest
+from skeleton_writer import FLAVOURS, NAMELESS, Z_UP, Style, bvh
+
+from naoimitate.core.errors import MotionFormatError
+from naoimitate.core.frames import LANDMARK, Motion
+from naoimitate.motion import load_motion
+from naoimitate.motion.builtin import builtin_motion
+
+pytestmark = pytest.mark.filterwarnings("ignore:Gimbal lock")
+
+STEP = 24
+RATE = 100.0 / STEP
+
+
+@cache
+def truth() -> Motion:
+    return builtin_motion("walk")
+
+
+@cache
+def text() -> str:
+    return bvh(truth(), Style(rate=RATE), STEP)
+
+
+def read(folder: Path, content: str, name: str = "person.bvh", **wishes: object) -> Motion:
+    (folder / name).write_text(content)
+    return load_motion(folder / name, **wishes)
+
+
+def apart(motion: Motion) -> float:
+    """Largest distance of a landmark from the truth, m, after the true person was put over the origin."""
+    true = truth().landmarks[::STEP]
+    error = motion.landmarks - (true - true[0, LANDMARK["pelvis"]] * [1.0, 1.0, 0.0])
+    return float(np.linalg.norm(error - [0.0, 0.0, error[..., 2].mean()], axis=-1).max())
+
+
+def head_and_rows(content: str) -> tuple[str, list[str]]:
+    """Everything up to the frame time, and the lines of numbers."""
+    first = content.index("\n", content.index("Frame Time")) + 1
+    return content[:first], content[first:].split("\n")[:-1]
+
+
+def with_rows(content: str, change: Callable[[list[str]], list[str]]) -> str:
+    head, rows = head_and_rows(content)
+    return head + "\n".join(change(rows)) + "\n"
+
+
+def under_a_reference(content: str, channels: str, values: str, name: str = "Reference") -> str:
+    """The same skeleton below a joint that does not move, as MotionBuilder and iClone write it."""
+    hierarchy, motion = content.split("MOTION")
+    inner = hierarchy.removeprefix("HIERARCHY\n").replace("ROOT", "JOINT", 1)
+    outer = f"HIERARCHY\nROOT {name}\n{{\n\tOFFSET 0 0 0\n\t{channels}\n{inner}}}\nMOTION"
+    return with_rows(outer + motion, lambda rows: [values + row for row in rows])
+
+
+def rotations_first(content: str) -> str:
+    swapped = re.sub(r"(CHANNELS 6)( \w+ \w+ \w+)( \w+ \w+ \w+)", r"\1\3\2", content)
+    return with_rows(swapped, lambda rows: [_moved(row.split()) for row in rows])
+
+
+def _moved(words: list[str]) -> str:
+    return " ".join([*words[3:6], *words[:3], *words[6:]])
+
+
+def without_channels_of_the_toes(content: str) -> str:
+    """The toes' joints, which never turn here, have neither channels nor numbers."""
+    joints = re.findall(r"(?:ROOT|JOINT) (\w+)", content)
+    columns = [c for i, name in enumerate(joints) for c in [name] * (6 if i == 0 else 3)]
+    kept = [i for i, name in enumerate(columns) if "ToeBase" not in name]
+    bare = re.sub(r"(JOINT \w*ToeBase\s*\{\s*OFFSET[^\n]*\n)\s*CHANNELS[^\n]*\n", r"\1", content)
+    return with_rows(bare, lambda rows: [" ".join(np.array(row.split())[kept]) for row in rows])
+
+
+SIX = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+END = re.compile(r"End Site\s*\{\s*OFFSET[^\n]*\s*\}\s*")
+ODD: dict[str, Callable[[str], str]] = {
+    "windows line ends and tabs": lambda t: t.replace(" ", "\t").replace("End\tSite", "End Site").replace("\n", "\r\n"),
+    "blanks at the ends of lines and blank lines": lambda t: t.replace("\n", "  \n\n"),
+    "braces behind the names": lambda t: re.sub(r"\s*\n\s*\{", " {", t),
+    "offset and channels on one line": lambda t: re.sub(r"\s*\n\s*CHANNELS", "  CHANNELS", t),
+    "keywords in small letters": lambda t: re.sub(
+        "HIERARCHY|ROOT|JOINT|End Site|OFFSET|CHANNELS|MOTION|Frames|Frame Time", lambda m: m.group().lower(), t
+    ),
+    "keywords in capitals": lambda t: re.sub("End Site|Frames|Frame Time", lambda m: m.group().upper(), t),
+    "blanks before colons": lambda t: t.replace("Time:", "Time :").replace("Frames:", "Frames : "),
+    "channels in capitals": lambda t: t.replace("rotation", "ROTATION").replace("position", "POSITION"),
+    "decimal commas": lambda t: t.replace(".", ","),
+    "commas between the numbers": lambda t: with_rows(t, lambda rows: [row.replace(" ", ", ") for row in rows]),
+    "powers of ten": lambda t: with_rows(
+        t, lambda rows: [" ".join(f"{float(word):+.9E}" for word in row.split()) for row in rows]
+    ),
+    "frames over two lines": lambda t: with_rows(t, lambda rows: [row.replace(" ", "\n", 20) for row in rows]),
+    "all frames on one line": lambda t: with_rows(t, lambda rows: [" ".join(rows)]),
+    "zeros behind the end": lambda t: t + "\0\0\0",
+    "no number of frames": lambda t: re.sub(r"Frames: \d+\n", "", t),
+    "two ends of a bone": lambda t: END.sub(lambda m: m.group() * 2, t),
+    "an end at the hips": lambda t: t.replace("\tJOINT", "\tEnd Site\n\t{\n\tOFFSET 0 -9 0\n\t}\n\tJOINT", 1),
+    "ends with names": lambda t: t.replace("End Site", "End Site tip"),
+    "rotations before positions": rotations_first,
+    "joints without channels": without_channels_of_the_toes,
+    "hips below a reference with channels": lambda t: under_a_reference(t, SIX, "0 0 0 0 0 0 "),
+    "hips below a reference with no channels": lambda t: under_a_reference(t, "CHANNELS 0", ""),
+    "hips below a reference without channels": lambda t: under_a_reference(t, "", ""),
+    "hips with a name of their own": lambda t: t.replace("ROOT Hips", "ROOT Actor 7"),
+    "a name twice": lambda t: t.replace("JOINT Spine1", "JOINT Spine"),
+    "names in a name space": lambda t: re.sub(r"(JOINT|ROOT) ", r"\1 scene:actor:", t),
+}
+
+
+@pytest.mark.parametrize("change", ODD.values(), ids=ODD.keys())
+def test_the_shape_of_a_file_does_not_matter(change: Callable[[str], str], tmp_path: Path) -> None:
+    motion = read(tmp_path, change(text()))
+    assert motion.rate == pytest.approx(RATE, rel=1e-4)
+    assert apart(motion) < 0.001
+
+
+@pytest.mark.parametrize("order", ["XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX"])
+def test_any_order_of_rotations_is_read(order: str, tmp_path: Path) -> None:
+    assert apart(read(tmp_path, bvh(truth(), Style(order=order, rate=RATE), STEP))) < 0.001
+
+
+@pytest.mark.parametrize("unit", [1.0, 0.3048, 0.1, 0.0254, 0.01, 0.001])
+def test_usual_units_are_told_by_the_person(unit: float, tmp_path: Path) -> None:
+    assert apart(read(tmp_path, bvh(truth(), Style(unit=unit, rate=RATE), STEP))) < 0.001
+
+
+def test_hips_that_move_below_a_reference_of_iclone_travel(tmp_path: Path) -> None:
+    style = Style(FLAVOURS["iclone"], six_channels=True, axes=Z_UP, rate=RATE)
+    motion = read(tmp_path, under_a_reference(bvh(truth(), style, STEP), SIX, "0 0 0 0 0 0 ", "RL_BoneRoot"))
+    assert apart(motion) < 0.001
+    assert motion.landmarks[-1, LANDMARK["pelvis"], 0] > 1.0
+
+
+def test_position_channels_that_are_relative_to_the_offset_are_told_by_their_size(tmp_path: Path) -> None:
+    content = bvh(truth(), Style(six_channels=True, rate=RATE), STEP)
+    joints = len(re.findall("JOINT", content))
+    wobble = "0.01 0.01 0.01"
+
+    def relative(row: str) -> str:
+        words = row.split()
+        rest = [words[6 + 6 * i + 3 : 6 + 6 * i + 6] for i in range(joints)]
+        return " ".join([*words[:6], *(f"{wobble} {' '.join(turns)}" for turns in rest)])
+
+    assert apart(read(tmp_path, with_rows(content, lambda rows: [relative(row) for row in rows]))) < 0.003
+
+
+@pytest.mark.parametrize(
+    "names", [FLAVOURS["no collar"], FLAVOURS["daz"], NAMELESS], ids=["no collar", "daz", "nameless"]
+)
+def test_a_skeleton_whose_bones_have_no_ends_is_read(names: dict[str, str], tmp_path: Path) -> None:
+    motion = read(tmp_path, END.sub("", bvh(truth(), Style(names, rate=RATE), STEP)))
+    assert np.isfinite(motion.landmarks).all()
+    limbs = [LANDMARK[f"{s}_{part}"] for s in "lr" for part in ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")]
+    assert np.abs(motion.landmarks[:, limbs] - whole(tmp_path, names).landmarks[:, limbs]).max() < 0.02
+
+
+def whole(folder: Path, names: dict[str, str]) -> Motion:
+    return read(folder, bvh(truth(), Style(names, rate=RATE), STEP))
+
+
+def test_a_head_that_is_missing_is_placed_above_the_neck(tmp_path: Path) -> None:
+    motion = read(tmp_path, bvh(truth(), Style(without=("head",), rate=RATE), STEP))
+    assert apart(motion) < 0.03
+
+
+def test_frames_that_do_not_fit_the_channels_say_how(tmp_path: Path) -> None:
+    for change in (
+        lambda row: row + " 0",
+        lambda row: row.rsplit(" ", 1)[0],
+        lambda row: row.replace(" ", "\n", 1)[:-9],
+    ):
+        with pytest.raises(MotionFormatError, match="numbers, not one for each of the 66 channels: export"):
+            read(tmp_path, with_rows(text(), lambda rows, c=change: [c(row) for row in rows]))
+
+
+def test_a_header_full_of_blanks_is_read_at_once(tmp_path: Path) -> None:
+    assert apart(read(tmp_path, text().replace("ROOT", " " * 300_000 + "ROOT", 1))) < 0.001
+
+
+def test_the_root_of_an_acclaim_skeleton_has_its_own_order(tmp_path: Path) -> None:
+    (tmp_path / "07.asf").write_text(motion_texts.asf().replace("TX TY TZ RX RY RZ", "RX RY RZ TZ TY TX"))
+    swapped = re.sub(
+        r"^root (\S+) (\S+) (\S+) (.*)$", r"root \4 \3 \2 \1", motion_texts.amc(truth(), STEP), flags=re.MULTILINE
+    )
+    assert apart(read(tmp_path, swapped, "07_01.amc", fps=RATE)) < 0.001
+    (tmp_path / "07.asf").write_text(motion_texts.asf().replace("TX TY TZ RX RY RZ", "TX TY TZ"))
+    with pytest.raises(MotionFormatError, match="skeleton is damaged"):
+        read(tmp_path, swapped, "07_01.amc", fps=RATE)
+
+
+def test_a_frame_that_xsens_lost_or_damaged_leaves_a_gap_in_time(tmp_path: Path) -> None:
+    content = motion_texts.mvnx(truth(), STEP, RATE)
+    lost = re.sub(r'<frame time="\d+" index="5".*?</frame>\n', "", content, flags=re.DOTALL)
+    damaged = re.sub(r'(index="5" type="normal">\n)<orientation>\S+ ', r"\1<orientation>", content)
+    for broken in (lost, damaged):
+        assert broken != content
+        steps = np.diff(read(tmp_path, broken, "person.mvnx").time) * RATE
+        assert steps[4] == pytest.approx(2.0, rel=1e-3) and np.delete(steps, 4) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_contacts_of_xsens_without_numbers_count_in_their_order(tmp_path: Path) -> None:
+    content = motion_texts.mvnx(truth(), STEP, RATE)
+    for index in ("", ' index="first"'):
+        odd = re.sub(r'(<contactDefinition label="\w+") index="\d"', rf"\1{index}", content)
+        assert odd != content
+        motion = read(tmp_path, odd, "person.mvnx")
+        assert np.array_equal(motion.contacts[:, 0], np.isin(truth().support[::STEP], ["D", "L"]))
