@@ -16,6 +16,8 @@ from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import LANDMARK, Motion
 from naoimitate.motion import load_motion
 from naoimitate.motion.builtin import builtin_motion
+from naoimitate.motion.load import recorded
+from naoimitate.motion.scene import Options
 
 pytestmark = pytest.mark.filterwarnings("ignore:Gimbal lock")
 
@@ -197,6 +199,35 @@ def test_the_root_of_an_acclaim_skeleton_has_its_own_order(tmp_path: Path) -> No
     (tmp_path / "07.asf").write_text(motion_texts.asf().replace("TX TY TZ RX RY RZ", "TX TY TZ"))
     with pytest.raises(MotionFormatError, match="skeleton is damaged"):
         read(tmp_path, swapped, "07_01.amc", fps=RATE)
+
+
+def test_an_acclaim_motion_of_another_skeleton_is_refused(tmp_path: Path) -> None:
+    content = motion_texts.amc(truth(), STEP)
+    for other in (("name ltibia", "name shank"), ("dof rx ry rz", "dof rx rz")):
+        (tmp_path / "07.asf").write_text(motion_texts.asf().replace(*other).replace("ltibia", "shank"))
+        with pytest.raises(MotionFormatError, match=r"07.asf: name its own with --skeleton"):
+            read(tmp_path, content, "07_01.amc", fps=RATE)
+
+
+@pytest.mark.parametrize("copies", [1, 2, 30])
+def test_an_added_tpose_may_be_there_more_than_once(copies: int, tmp_path: Path) -> None:
+    content = bvh(truth(), Style(rate=RATE), STEP, added=True)
+    motion = read(tmp_path, with_rows(content, lambda rows: rows[:1] * copies + rows[1:]))
+    assert motion.time[0] == pytest.approx(copies / RATE) and "added first frame" in motion.tpose_note
+    assert apart(motion) < 0.03  # the floor under a walk may be found a little tilted
+
+
+def test_a_held_tpose_that_nobody_added_is_motion(tmp_path: Path) -> None:
+    held = bvh(builtin_motion("paper"), Style(rate=RATE), STEP)
+    motion = read(tmp_path, with_rows(held, lambda rows: rows[:1] * 10 + rows))
+    assert motion.time[0] == 0.0 and "held at" in motion.tpose_note
+
+
+def test_what_hangs_far_beyond_the_toes_is_no_toe(tmp_path: Path) -> None:
+    ski = text().replace("OFFSET 0.000000 0.000000 5.000000", "OFFSET 0.000000 0.000000 90.000000")
+    assert ski != text()
+    (tmp_path / "ski.bvh").write_text(ski)
+    assert np.isnan(recorded(tmp_path / "ski.bvh", Options())[1][:, :, 2]).all()
 
 
 def test_a_frame_that_xsens_lost_or_damaged_leaves_a_gap_in_time(tmp_path: Path) -> None:

@@ -63,6 +63,7 @@ def read_amc(path: Path, data: bytes, skeleton: Path | None) -> Clip:
     degrees = asf.degrees if ":RADIANS" not in text[:2000].upper() else False
     frames, notes = _parse_amc(text)
     nodes, names = _skeleton(asf)
+    _check_fit(asf, frames, asf_path.name)
     root, local = _channels(asf, frames, names, degrees)
     positions, rotations = forward(nodes, root, local)
     notes.append(f"The skeleton is that of {asf_path.name}.")
@@ -200,6 +201,13 @@ def _complete(frame: dict[str, list[float]], shape: dict[str, int]) -> bool:
     return bool(frame) and all(n > 0 and len(frame.get(name, [])) == n for name, n in shape.items())
 
 
+def _check_fit(asf: _Asf, frames: list[dict[str, list[float]]], name: str) -> None:
+    """Raise MotionFormatError when the motion is that of another skeleton."""
+    for bone, values in ((b, n) for b, n in _usual_shape(frames).items() if b != "root"):
+        if bone not in asf.bones or len(asf.bones[bone].dof) != values:
+            raise MotionFormatError(f"the bone {bone} does not move like that of {name}: name its own with --skeleton")
+
+
 def _channels(asf: _Asf, frames: list[dict[str, list[float]]], names: list[str], degrees: bool) -> tuple[Array, Array]:
     """Root positions (T, 3) and rotations of the nodes against their parents (T, J, 3, 3)."""
     table = {name: np.array([frame[name] for frame in frames]) for name in _usual_shape(frames)}
@@ -211,7 +219,7 @@ def _channels(asf: _Asf, frames: list[dict[str, list[float]]], names: list[str],
             continue
         bone = asf.bones[name]
         angles = np.zeros((len(frames), 3))
-        for column, dof in enumerate(bone.dof[: table[name].shape[1]]):
+        for column, dof in enumerate(bone.dof):
             if dof in ("rx", "ry", "rz"):
                 angles[:, "xyz".index(dof[1])] = table[name][:, column]
         local[:, i] = bone.axis @ _turns(bone.order, angles, degrees) @ bone.axis.T

@@ -27,6 +27,8 @@ JUMP = 0.12
 """m that a landmark moves against the pelvis (or the pelvis itself) from an added frame to the next, at least."""
 JUMP_FACTOR = 5.0
 """The same in median steps of the clip."""
+SAME = 1e-4
+"""m: landmarks that move less from frame to frame were copied, nobody stands so still."""
 TRANSIENT = 0.02
 """m by which the steps of a filter's transient change within ``LAG`` frames."""
 LAG = 3
@@ -83,16 +85,19 @@ def is_tpose(landmarks: Array) -> npt.NDArray[np.bool_]:
 def added_frames(track: Track) -> int:
     """How many frames at the start are no motion: an added T-pose or rest pose, and a filter's transient after it.
 
-    Told from the data: the first posture is one of the two, and from it to the next the person jumps. A transient
-    lasts as long as the steps between frames change by more than they do later.
+    Told from the data: the first posture is one of the two, perhaps some times over, and from it to the next the
+    person jumps. A transient lasts as long as the steps between frames change by more than they do later.
     """
-    n = len(track)
-    if n < 3 or not (bool(is_tpose(track.landmarks[:1])[0]) or _is_rest(track)):
+    if len(track) < 3 or not (bool(is_tpose(track.landmarks[:1])[0]) or _is_rest(track)):
         return 0
     posture = track.landmarks - track.landmarks[:, LANDMARK["pelvis"], None]
     steps = np.diff(np.concatenate([posture, track.landmarks[:, LANDMARK["pelvis"], None]], axis=1), axis=0)
-    size = np.nan_to_num(np.linalg.norm(steps, axis=-1), nan=0.0).max(axis=1)
-    if size[0] < max(JUMP, JUMP_FACTOR * float(np.median(size[1:]))):
+    moved = np.linalg.norm(steps, axis=-1)
+    seen = np.isfinite(moved).sum(axis=1)
+    size = np.nan_to_num(moved, nan=0.0).max(axis=1)
+    copies = int(np.argmax((size > SAME) | (seen < seen.max())))
+    steps, size = steps[copies:], size[copies:]
+    if len(size) < 2 or size[0] < max(JUMP, JUMP_FACTOR * float(np.median(size[1:]))):
         return 0
     change = np.nan_to_num(np.linalg.norm(steps[LAG:] - steps[:-LAG], axis=-1), nan=0.0).max(axis=1)
     later = change[LONGEST_TRANSIENT : 2 * LONGEST_TRANSIENT]
@@ -101,7 +106,7 @@ def added_frames(track: Track) -> int:
     for frame in range(1, min(LONGEST_TRANSIENT, len(change))):
         if change[frame] > limit and frame - last <= 2:
             last = frame
-    return last + 1
+    return copies + last + 1
 
 
 def _is_rest(track: Track) -> bool:
