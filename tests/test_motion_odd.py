@@ -197,7 +197,7 @@ def test_the_root_of_an_acclaim_skeleton_has_its_own_order(tmp_path: Path) -> No
     )
     assert apart(read(tmp_path, swapped, "07_01.amc", fps=RATE)) < 0.001
     (tmp_path / "07.asf").write_text(motion_texts.asf().replace("TX TY TZ RX RY RZ", "TX TY TZ"))
-    with pytest.raises(MotionFormatError, match="skeleton is damaged"):
+    with pytest.raises(MotionFormatError, match=r"skeleton 07.asf is damaged \(root\)"):
         read(tmp_path, swapped, "07_01.amc", fps=RATE)
 
 
@@ -218,9 +218,10 @@ def test_an_added_tpose_may_be_there_more_than_once(copies: int, tmp_path: Path)
 
 
 def test_a_held_tpose_that_nobody_added_is_motion(tmp_path: Path) -> None:
-    held = bvh(builtin_motion("paper"), Style(rate=RATE), STEP)
-    motion = read(tmp_path, with_rows(held, lambda rows: rows[:1] * 10 + rows))
-    assert motion.time[0] == 0.0 and "held at" in motion.tpose_note
+    for step in (1, STEP, 2 * STEP):
+        held = bvh(builtin_motion("paper"), Style(rate=100.0 / step), step)
+        motion = read(tmp_path, with_rows(held, lambda rows: rows[:1] * 10 + rows))
+        assert motion.time[0] == 0.0 and "held at" in motion.tpose_note
 
 
 def test_what_hangs_far_beyond_the_toes_is_no_toe(tmp_path: Path) -> None:
@@ -247,3 +248,9 @@ def test_contacts_of_xsens_without_numbers_count_in_their_order(tmp_path: Path) 
         assert odd != content
         motion = read(tmp_path, odd, "person.mvnx")
         assert np.array_equal(motion.contacts[:, 0], np.isin(truth().support[::STEP], ["D", "L"]))
+
+
+@pytest.mark.parametrize("tag", ["<a:contact/>", "<x:y:z>1</x:y:z>", '<x xmlns="of/}a">1</x>'])
+def test_tags_that_no_program_writes_are_passed_over(tag: str, tmp_path: Path) -> None:
+    content = motion_texts.mvnx(truth(), STEP, RATE)
+    assert apart(read(tmp_path, content.replace("<frames>", f"{tag}<frames>"), "person.mvnx")) < 0.001

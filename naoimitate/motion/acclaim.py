@@ -56,7 +56,7 @@ def read_amc(path: Path, data: bytes, skeleton: Path | None) -> Clip:
     """
     asf_path = skeleton if skeleton is not None else _beside(path)
     try:
-        asf = _parse_asf(decode(asf_path.read_bytes()))
+        asf = _parse_asf(decode(asf_path.read_bytes()), asf_path.name)
     except OSError as error:
         raise MotionFormatError(f"the skeleton {asf_path} cannot be read: {error.strerror}") from error
     text = decode(data)
@@ -83,17 +83,17 @@ def _beside(path: Path) -> Path:
     raise MotionFormatError(f"{path.name} needs its skeleton: name it with --skeleton FILE.asf")
 
 
-def _parse_asf(text: str) -> _Asf:
+def _parse_asf(text: str, name: str) -> _Asf:
     sections: dict[str, list[list[str]]] = {}
-    name = ""
+    section = ""
     for line in text.split("\n"):
         words = line.split("#")[0].split()
         if words and words[0].startswith(":"):
-            name = words[0].lower()
-            sections[name] = []
+            section = words[0].lower()
+            sections[section] = []
             words = words[1:]
-        if words and name:
-            sections[name].append(words)
+        if words and section:
+            sections[section].append(words)
     try:
         units = {words[0].lower(): words[1] for words in sections.get(":units", []) if len(words) > 1}
         degrees = units.get("angle", "deg").lower().startswith("deg")
@@ -105,9 +105,10 @@ def _parse_asf(text: str) -> _Asf:
             raise ValueError("root")
         asf = _Asf(bones, parent, order, axis, float(units.get("length", 1.0)), degrees)
     except (KeyError, ValueError, IndexError, StopIteration) as error:
-        raise MotionFormatError(f"the ASF skeleton is damaged ({error}): get the complete file") from error
+        where = f"no {error.args[0]}" if isinstance(error, KeyError) else str(error)
+        raise MotionFormatError(f"the ASF skeleton {name} is damaged ({where}): get the complete file") from error
     if not bones or not np.isfinite([b.offset for b in bones.values()]).all() or not np.isfinite(asf.length):
-        raise MotionFormatError("the ASF skeleton has no bones with finite lengths: get the complete file")
+        raise MotionFormatError(f"the ASF skeleton {name} has no bones with finite lengths: get the complete file")
     return asf
 
 

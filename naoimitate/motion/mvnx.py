@@ -88,7 +88,7 @@ def _collect(data: bytes) -> _File:
             io.BytesIO(data), events=("end",), resolve_entities=False, no_network=True, load_dtd=False
         ):
             if isinstance(element.tag, str):
-                _take(file, etree.QName(element).localname, element)
+                _take(file, _local(element.tag), element)
     except etree.XMLSyntaxError as error:
         file.broken = True
         if not file.frames.get("normal"):
@@ -96,6 +96,11 @@ def _collect(data: bytes) -> _File:
                 "the MVNX file is cut off or damaged before its motion: get the complete file"
             ) from error
     return file
+
+
+def _local(tag: str) -> str:
+    """The name of a tag without its name space; damaged ones have any letters."""
+    return tag.rpartition("}")[2]
 
 
 def _take(file: _File, tag: str, element: etree._Element) -> None:
@@ -125,7 +130,7 @@ def _take_rate(file: _File, element: etree._Element) -> None:
 
 def _take_frame(file: _File, element: etree._Element) -> None:
     kind = element.get("type") or "normal"
-    values = {etree.QName(child).localname: _floats(child.text) for child in element if isinstance(child.tag, str)}
+    values = {_local(child.tag): _floats(child.text) for child in element if isinstance(child.tag, str)}
     planted = [c.get("segment", "") for c in element.iter("{*}contact")]
     if planted:
         values["contactSegments"] = [

@@ -68,8 +68,9 @@ def _reflowed(rows: list[list[float]], columns: int, frames: int | None) -> Arra
         return np.array(values).reshape(-1, columns)
     if not values or len(values) < columns:
         raise MotionFormatError("the file has no complete frame of motion: get the complete file")
+    most = max(map(len, rows))
     raise MotionFormatError(
-        f"the frames have {len(rows[0])} numbers, not one for each of the {columns} channels: export the file again"
+        f"the frames have {most} numbers, not one for each of the {columns} channels: export the file again"
     )
 
 

@@ -29,6 +29,8 @@ JUMP_FACTOR = 5.0
 """The same in median steps of the clip."""
 SAME = 1e-4
 """m: landmarks that move less from frame to frame were copied, nobody stands so still."""
+SUDDEN = 0.9
+"""Who moves out of a T-pose that is held gains speed: the first step is less than this share of the second."""
 TRANSIENT = 0.02
 """m by which the steps of a filter's transient change within ``LAG`` frames."""
 LAG = 3
@@ -98,6 +100,8 @@ def added_frames(track: Track) -> int:
     copies = int(np.argmax((size > SAME) | (seen < seen.max())))
     steps, size = steps[copies:], size[copies:]
     if len(size) < 2 or size[0] < max(JUMP, JUMP_FACTOR * float(np.median(size[1:]))):
+        return 0
+    if copies and size[0] < SUDDEN * size[1]:
         return 0
     change = np.nan_to_num(np.linalg.norm(steps[LAG:] - steps[:-LAG], axis=-1), nan=0.0).max(axis=1)
     later = change[LONGEST_TRANSIENT : 2 * LONGEST_TRANSIENT]
