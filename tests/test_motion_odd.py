@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from functools import cache
@@ -21,6 +22,7 @@ from naoimitate.motion.scene import Options
 
 pytestmark = pytest.mark.filterwarnings("ignore:Gimbal lock")
 
+MOCAP = Path(os.environ.get("NAOIMITATE_MOCAP", Path(__file__).parents[2] / "shared" / "mocap"))
 STEP = 24
 RATE = 100.0 / STEP
 
@@ -142,6 +144,26 @@ def test_hips_that_move_below_a_reference_of_iclone_travel(tmp_path: Path) -> No
     motion = read(tmp_path, under_a_reference(bvh(truth(), style, STEP), SIX, "0 0 0 0 0 0 ", "RL_BoneRoot"))
     assert apart(motion) < 0.001
     assert motion.landmarks[-1, LANDMARK["pelvis"], 0] > 1.0
+
+
+@pytest.mark.skipif(not MOCAP.exists(), reason=f"no recorded clips in {MOCAP}")
+@pytest.mark.parametrize("place", ["0 0 0 0 90 0 ", "500 100 -300 0 0 40 "], ids=["z up", "elsewhere"])
+@pytest.mark.parametrize(
+    "file",
+    [
+        "cmu/02_02_walk.bvh",
+        "cmu/131_03_start_hop_stop.bvh",
+        "cmu/88_03_motorcycle_pose_daz.bvh",
+        "other/mass_balance_one_leg.bvh",
+        "other/xsens_upperbody_gpl3.bvh",
+    ],
+)
+def test_where_a_recording_stands_in_its_world_does_not_matter(file: str, place: str, tmp_path: Path) -> None:
+    content = (MOCAP / file).read_text().replace("\r\n", "\n")
+    here = load_motion(MOCAP / file)
+    there = read(tmp_path, under_a_reference(content, SIX, place), Path(file).name)
+    assert np.array_equal(here.support, there.support) and here.tpose_note == there.tpose_note
+    assert np.abs(here.landmarks - there.landmarks).max() < 1e-3
 
 
 def test_position_channels_that_are_relative_to_the_offset_are_told_by_their_size(tmp_path: Path) -> None:

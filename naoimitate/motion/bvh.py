@@ -153,13 +153,13 @@ def _hierarchy(header: _Header) -> Skeleton:
 
 def _columns(table: Array, header: _Header, skeleton: Skeleton) -> tuple[Array, dict[int, Array]]:
     """Angles (T, N, 3) in deg in each joint's order, and position channels (T, 3) by the node of their joint."""
-    angles, column = np.zeros((len(table), len(header.channels), 3)), 0
+    angles, orders, column = np.zeros((len(table), len(header.channels), 3)), header.orders, 0
     places = {0: np.zeros((len(table), 3))}
     for i, (node, block) in enumerate(zip(np.flatnonzero(~skeleton.ends), header.channels, strict=True)):
         for channel in block:
             axis = channel[0].upper()
             if channel.lower().endswith("rotation"):
-                angles[:, i, header.orders[i].index(axis)] = table[:, column]
+                angles[:, i, orders[i].index(axis)] = table[:, column]
             else:
                 place = places.setdefault(int(node), np.zeros((len(table), 3)))
                 place[:, "XYZ".index(axis)] = table[:, column]
