@@ -19,6 +19,7 @@ from naoimitate.motion import load_motion
 from naoimitate.motion.builtin import builtin_motion
 from naoimitate.motion.load import recorded
 from naoimitate.motion.scene import Options
+from naoimitate.motion.tpose import is_tpose
 
 pytestmark = pytest.mark.filterwarnings("ignore:Gimbal lock")
 
@@ -276,3 +277,28 @@ def test_contacts_of_xsens_without_numbers_count_in_their_order(tmp_path: Path) 
 def test_tags_that_no_program_writes_are_passed_over(tag: str, tmp_path: Path) -> None:
     content = motion_texts.mvnx(truth(), STEP, RATE)
     assert apart(read(tmp_path, content.replace("<frames>", f"{tag}<frames>"), "person.mvnx")) < 0.001
+
+
+@pytest.mark.parametrize("rest", ["t", "x"])
+@pytest.mark.parametrize("wish", [{}, {"tpose_at": 3.0}], ids=["found", "asked"])
+def test_somebody_who_lies_on_a_side_has_a_tpose(rest: str, wish: dict[str, float], tmp_path: Path) -> None:
+    content = bvh(truth(), Style(rest=rest, rate=RATE), STEP)
+    motion = read(tmp_path, under_a_reference(content, SIX, "0 0 0 90 0 0 "), up="y", **wish)
+    assert np.isfinite(motion.landmarks).all() and is_tpose(motion.tpose.landmarks[None])[0] == (not wish)
+    for part in ("knee", "ankle", "elbow", "wrist"):
+        above = {"knee": "hip", "ankle": "knee", "elbow": "shoulder", "wrist": "elbow"}[part]
+        bones = [np.linalg.norm(m.tpose[f"l_{part}"] - m.tpose[f"l_{above}"]) for m in (motion, truth())]
+        assert bones[0] == pytest.approx(bones[1], abs=1e-3)
+
+
+def test_a_calibration_posture_that_does_not_stand_in_the_world_asked_for_is_not_used(tmp_path: Path) -> None:
+    motion = read(tmp_path, motion_texts.mvnx(truth(), STEP, RATE), "person.mvnx", up="y")
+    assert np.isfinite(motion.landmarks).all() and "segment lengths" in motion.tpose_note
+
+
+def test_an_acclaim_motion_says_the_unit_of_its_own_angles(tmp_path: Path) -> None:
+    skeleton = motion_texts.asf().replace("angle deg", "angle rad")
+    turned = " ".join(f"{np.radians(angle):.9f}" for angle in motion_texts.AXIS)
+    skeleton = re.sub(r"axis \S+ \S+ \S+ XYZ", f"axis {turned} XYZ", skeleton)
+    (tmp_path / "07.asf").write_text(skeleton)
+    assert apart(read(tmp_path, motion_texts.amc(truth(), STEP), "07_01.amc", fps=RATE)) < 0.001

@@ -60,7 +60,8 @@ def read_amc(path: Path, data: bytes, skeleton: Path | None) -> Clip:
     except OSError as error:
         raise MotionFormatError(f"the skeleton {asf_path} cannot be read: {error.strerror}") from error
     text = decode(data)
-    degrees = asf.degrees if ":RADIANS" not in text[:2000].upper() else False
+    marks = text[:2000].upper()
+    degrees = ":DEGREES" in marks or (asf.degrees and ":RADIANS" not in marks)
     frames, notes = _parse_amc(text)
     nodes, names = _skeleton(asf)
     _check_fit(asf, frames, asf_path.name)
@@ -204,8 +205,10 @@ def _complete(frame: dict[str, list[float]], shape: dict[str, int]) -> bool:
 
 def _check_fit(asf: _Asf, frames: list[dict[str, list[float]]], name: str) -> None:
     """Raise MotionFormatError when the motion is that of another skeleton."""
-    for bone, values in ((b, n) for b, n in _usual_shape(frames).items() if b != "root"):
-        if bone not in asf.bones or len(asf.bones[bone].dof) != values:
+    moves = {bone: count for bone, count in _usual_shape(frames).items() if bone != "root"}
+    can = {bone: len(asf.bones[bone].dof) for bone in asf.bones if asf.bones[bone].dof}
+    for bone in [*moves, *can]:
+        if moves.get(bone) != can.get(bone):
             raise MotionFormatError(f"the bone {bone} does not move like that of {name}: name its own with --skeleton")
 
 

@@ -23,6 +23,8 @@ HOLD = 0.4
 STILL = 0.25
 """m/s: wrists that hold a pose are slower."""
 
+ON_A_SIDE = 0.95
+"""Sine of the slope of the line from right to left, from which on somebody lies on a side."""
 JUMP = 0.12
 """m that a landmark moves against the pelvis (or the pelvis itself) from an added frame to the next, at least."""
 JUMP_FACTOR = 5.0
@@ -48,14 +50,19 @@ def angle(a: Array, b: Array) -> Array:
 
 
 def across(landmarks: Array) -> Array:
-    """Horizontal unit direction (..., 3) to the person's left, the mean of the lines of hips and shoulders, z up."""
+    """Horizontal unit direction (..., 3) to the person's left, the mean of the lines of hips and shoulders, z up.
+
+    NaN where these lines are nearly vertical: of somebody who lies on a side.
+    """
     total = np.zeros((*landmarks.shape[:-2], 3))
     for part in ("hip", "shoulder"):
         line = landmarks[..., LANDMARK[f"l_{part}"], :] - landmarks[..., LANDMARK[f"r_{part}"], :]
         total += line / np.maximum(np.linalg.norm(line, axis=-1, keepdims=True), 1e-9)
+    slope = np.abs(total[..., 2:]) / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-9)
     total[..., 2] = 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(total / np.linalg.norm(total, axis=-1, keepdims=True))
+        level = total / np.linalg.norm(total, axis=-1, keepdims=True)
+    return np.where(slope < ON_A_SIDE, level, np.nan)
 
 
 def heading(landmarks: Array) -> float:
