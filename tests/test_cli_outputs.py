@@ -82,3 +82,11 @@ def test_too_little_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: 
     monkeypatch.setattr(demo, "callback", exhaust)
     assert run(["demo"]) == 2
     assert "memory" in capsys.readouterr().err
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("naoimitate.cli.folder.is_writable", lambda folder: False)
+    assert run(["demo", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err.startswith("naoimitate: cannot write into the folder")

@@ -31,13 +31,14 @@ def check(source: str, robot_version: str | None, out: Path | None, **reading: A
 
     keep_apart((source, reading["skeleton"]), [out])
     lines, figure = _robot(source, robot_version) if _is_robot(source) else _motion(source, reading)
+    click.echo("\n".join(lines))
     path = out or Path(f"{Path(source.replace(':', '-')).stem}-check.png")
     try:
         with whole(path) as beside:
             beside.write_bytes(as_png(figure))
     except OSError as error:
         raise NaoimitateError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error
-    click.echo("\n".join([*lines, f"  picture: {path}"]))
+    click.echo(f"  picture: {path}")
 
 
 def _is_robot(source: str) -> bool:

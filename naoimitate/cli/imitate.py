@@ -54,7 +54,8 @@ if TYPE_CHECKING:
 def imitate(motion: str, **options: Any) -> None:
     """Imitate a recorded motion.
 
-    MOTION is a file or builtin:NAME. Every frame of the run file is statically stable; 'naoimitate score' measures it.
+    MOTION is a file or builtin:NAME. Every frame of the run file is statically stable, but with --retarget direct;
+    'naoimitate score' measures it.
     """
     from naoimitate.cli.outputs import keep_apart, whole
     from naoimitate.cli.progress import progress

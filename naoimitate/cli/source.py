@@ -17,7 +17,11 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 OPTIONS = (
     click.option(
-        "--tpose-at", type=MOMENT, default="auto", help="Moment of the T-pose; none: the skeleton's rest pose."
+        "--tpose-at",
+        type=MOMENT,
+        default="auto",
+        show_default=True,
+        help="Moment of the T-pose; none: the skeleton's rest pose.",
     ),
     click.option("--fps", type=FILE_RATE, help="Frame rate, where the file's own is wrong."),
     click.option("--unit", type=METRES, help="Metres per unit of the file."),

@@ -67,12 +67,12 @@ class OutputFile(click.ParamType):  # type: ignore[type-arg]
         if self._endings and path.suffix.lower() not in self._endings:
             self.fail(f"{value!r} does not end in {' or '.join(self._endings)}", param, ctx)
         path = path.resolve() if path.is_symlink() else path
-        if (path.exists() and not path.is_file()) or not _is_writable(path.parent):
+        if (path.exists() and not path.is_file()) or not is_writable(path.parent):
             self.fail(f"{value!r} cannot be written: choose a file in a folder that exists and is yours", param, ctx)
         return path
 
 
-def _is_writable(folder: Path) -> bool:
+def is_writable(folder: Path) -> bool:
     """Whether a file can be made in a folder: tried, because permissions do not tell of every file system."""
     try:
         tempfile.TemporaryFile(dir=folder).close()

@@ -13,7 +13,7 @@ import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from tokenize import TokenError
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -142,9 +142,10 @@ def load_run(path: str | Path) -> Run:
 def _read(path: Path) -> dict[str, npt.NDArray[Any]]:
     """The known keys of an .npz file as they are."""
     try:
-        with path.open("rb") as raw, np.lib.npyio.NpzFile(raw, allow_pickle=False) as file:
-            _check_size(file)
-            return {key: file[key] for key in file.files if key in KEYS}
+        with path.open("rb") as raw:
+            _check_sizes(raw)
+            with np.lib.npyio.NpzFile(raw, allow_pickle=False) as file:
+                return {key: file[key] for key in file.files if key in KEYS}
     except FileNotFoundError as error:
         raise RunFileError(f"{path}: no such file; make one with 'naoimitate imitate MOTION --out {path}'") from error
     except OSError as error:
@@ -153,19 +154,17 @@ def _read(path: Path) -> dict[str, npt.NDArray[Any]]:
         raise RunFileError(f"{path}: not a whole .npz run file; make it again with 'naoimitate imitate'") from error
 
 
-def _check_size(file: np.lib.npyio.NpzFile) -> None:
+def _check_sizes(raw: BinaryIO) -> None:
     """Raise ValueError for arrays that no run can fill: small files can claim to hold more than any memory."""
-    for name in KEYS:
-        member = f"{name}.npy"
-        if member not in file.zip.namelist():
-            continue
-        with file.zip.open(member) as stream:
-            version = np.lib.format.read_magic(stream)
-            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-            shape, _, dtype = read(stream)
-        size = math.prod(shape) * dtype.itemsize
-        if size > min(file.zip.getinfo(member).file_size, LARGEST):
-            raise ValueError(f"{name} claims to hold {size} bytes")
+    with zipfile.ZipFile(raw) as archive:
+        for member in {f"{key}.npy" for key in KEYS} & set(archive.namelist()):
+            with archive.open(member) as stream:
+                old = np.lib.format.read_magic(stream) == (1, 0)
+                header = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
+                shape, _, dtype = header(stream)
+            size = math.prod(shape) * dtype.itemsize
+            if size > min(archive.getinfo(member).file_size, LARGEST):
+                raise ValueError(f"{member} claims to hold {size} bytes")
 
 
 def _umask() -> int:
