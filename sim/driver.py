@@ -6,14 +6,15 @@ import threading
 import time
 from typing import NamedTuple
 
+from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import RobotState
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.placement import stand_on_floor
+from naoimitate.sim.sensors import roll_pitch
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.survival import has_tipped, roll_pitch, tilt
 
 DEFAULT = SimSettings()
 

@@ -21,17 +21,23 @@ NO_GL = (
 )
 
 
+PLATFORM = "PYOPENGL_PLATFORM"
+"""Environment variable that PyOpenGL obeys; MuJoCo's modules set it for good when they are imported."""
+
+
 class Canvas:
     """Draws scenes of one model. Raises RenderingUnavailable, with what to install, where no OpenGL works."""
 
     def __init__(self, model: mujoco.MjModel, width: int, height: int) -> None:
         reasons = []
+        platform = os.environ.get(PLATFORM)
         for backend in backends():
             try:
                 self._open(backend, model, width, height)
                 break
             except Exception as error:  # every library fails in its own way
-                reasons.append(f"{backend}: {(str(error) or type(error).__name__).splitlines()[0]}")
+                reasons.append(f"{backend}: {_reason(error)}")
+                _forget(backend, platform)
         else:
             raise RenderingUnavailable(NO_GL.format(reason="; ".join(reasons) or "MUJOCO_GL forbids it"))
         self._size = mujoco.MjrRect(0, 0, width, height)
@@ -55,6 +61,26 @@ class Canvas:
         self._context.make_current()
         self._painter.free()
         self._context.free()
+
+
+def _reason(error: Exception) -> str:
+    """Why a backend failed, in a few words; PyOpenGL has a missing library as an attribute of None."""
+    if isinstance(error, ImportError | AttributeError):
+        return "not installed"
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
+def _forget(backend: str, platform: str | None) -> None:
+    """Undo the import of a backend that failed: PyOpenGL stays with its first platform, and no other could be tried.
+
+    platform: value of ``PYOPENGL_PLATFORM`` before the import.
+    """
+    for name in list(sys.modules):
+        if name.split(".")[0] == "OpenGL" or name.startswith(f"mujoco.{backend}"):
+            del sys.modules[name]
+    os.environ.pop(PLATFORM, None)
+    if platform is not None:
+        os.environ[PLATFORM] = platform
 
 
 def backends() -> tuple[str, ...]:

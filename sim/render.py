@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 from PIL import Image as Pillow
 from PIL import ImageDraw, ImageFont
 
+from naoimitate.core.errors import RenderingUnavailable
 from naoimitate.core.frames import Array, Motion
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.gl import Image
@@ -21,7 +23,7 @@ VIDEO_SIZE = (960, 544)
 PANEL_SIZE = (320, 400)
 """Width and height, pixels."""
 
-BESIDE = 0.85
+BESIDE = 1.0
 """Distance of the person from the robot, in robot heights, to its right (left in a picture from the front)."""
 
 CAMERA_TIME = 1.0
@@ -45,7 +47,7 @@ def render_video(
     """Write an mp4 of a run: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), as planned or as simulated.
 
     human: the person, as tall as the robot and at its right; human_time: (T,) s in their motion, default: since the
-    first frame; progress: told the share that is done. Raises RenderingUnavailable without OpenGL.
+    first frame; progress: told the share that is done. Raises RenderingUnavailable without OpenGL or an encoder.
     """
     frames = np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, 1.0 / fps), side="right") - 1
     path = Path(path)
@@ -54,8 +56,7 @@ def render_video(
         centre = _camera_path(base_pos, time)
         if people is not None:
             centre = centre - np.array([0.0, 0.5 * BESIDE * stage.robot_height])
-        video: Any = imageio.get_writer(path, fps=fps, codec="libx264", quality=8)
-        with video:
+        with _encoder(path, fps) as video:
             for number, frame in enumerate(frames):
                 pose = q[frame], base_pos[frame], base_quat[frame]
                 person = None if people is None else people[frame]
@@ -98,6 +99,17 @@ def render_strip(
     strip = np.concatenate([np.concatenate(row, axis=1) for row in rows if row], axis=0)
     _label(strip, [f"{moment:.1f} s" for moment in moments]).save(path)
     return path
+
+
+@contextmanager
+def _encoder(path: Path, fps: float) -> Iterator[Any]:
+    """A writer of mp4 files; what it and its program raise becomes one line."""
+    try:
+        with imageio.get_writer(path, fps=fps, codec="libx264", quality=8) as video:
+            yield video
+    except (OSError, RuntimeError) as error:
+        reason = str(error).strip().splitlines() or [type(error).__name__]
+        raise RenderingUnavailable(f"No video: {path.suffix[1:]} cannot be encoded ({reason[0]})") from error
 
 
 def _people(

@@ -76,3 +76,13 @@ def _looking_along_x(pitch: float) -> Array:
     """Axes (3, 3) of a MuJoCo camera (x right, y up, z backwards) that looks along +x, pitched down by rad."""
     s, c = math.sin(pitch), math.cos(pitch)
     return np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
+
+
+def roll_pitch(quat: Array) -> Array:
+    """Roll and pitch (2,) rad of a torso, as an inertial board gives them: from the direction of gravity alone.
+
+    R = Rz(yaw) Ry(pitch) Rx(roll); the last row of R is (-sin p, cos p sin r, cos p cos r).
+    """
+    w, x, y, z = quat
+    down = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+    return np.array([math.atan2(down[1], down[2]), math.asin(min(max(-down[0], -1.0), 1.0))])

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.core.falling import has_fallen, swing_load, tilt
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.survival import has_fallen, swing_load, tilt
 
 DEFAULT = SimSettings()
 
@@ -31,7 +31,7 @@ class SimResult:
     load: (T, 2) N on the left and right sole, mean since the frame before. swing_load: (T,) share of the weight on the
     foot planned in the air. cop_margin: (T,) m from the centre of pressure to the edge of the planned stance soles
     where they really are, negative outside, NaN while the soles carry nothing.
-    fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``survival.has_fallen``).
+    fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``falling.has_fallen``).
     """
 
     time: Array

@@ -62,6 +62,15 @@ def test_score_check_fails_on_a_missed_bar_only(here: Path, capsys: pytest.Captu
     assert err == ""
 
 
+def test_a_run_of_a_robot_that_is_not_built_in_asks_for_its_folder(
+    here: Path, second_robot_folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    save(standing(load_robot(second_robot_folder), 60), "run.npz")
+    assert run(["score", "run.npz"]) == 2
+    assert "--robot" in capsys.readouterr().err
+    assert run(["score", "run.npz", "--robot", str(second_robot_folder), "--check"]) == 0
+
+
 def test_motions_lists_single_supports_with_side_and_times(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["motions", "--json"]) == 0
     motions = {motion["name"]: motion for motion in json.loads(capsys.readouterr().out)}

@@ -30,7 +30,18 @@ MISTAKES = [
     ["imitate", "builtin:paper", "--out", "run.npz", "--speed", "fast"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--speed", "nan"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--rate", "30"],
+    ["imitate", "builtin:paper", "--out", "run.npz", "--speed", "0.01"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--rate", "inf"],
+    ["imitate", "builtin:paper", "--out", "run.npz", "--rate", "1e9"],
+    ["imitate", "builtin:paper", "--out", "run.npz", "--sample", "0"],
+    ["imitate", "builtin:paper", "--out", "run.npz", "--sample", "1e12"],
+    ["imitate", "text.npz", "--out", "run.npz", "--fps", "1e-9"],
+    ["imitate", "paper", "--out", "run.npz"],
+    ["imitate", "broken.bvh", "--out", "broken.bvh"],
+    ["imitate", "builtin:paper", "--out", "same.html", "--report", "same.html"],
+    ["imitate", "builtin:paper", "--out", "text.npz", "--subject", "text.npz"],
+    ["imitate", "builtin:paper", "--out", "/dev/null"],
+    ["imitate", "builtin:paper", "--out", "/proc/run.npz"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--retarget", "other"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--robot", "other"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--robot-version", "v9"],
@@ -40,6 +51,7 @@ MISTAKES = [
     ["imitate", "builtin:paper", "--out", "run.npz", "--video", "run.gif"],
     ["imitate", "builtin:paper", "--out", "run.npz", "--environment", "stairs.yaml"],
     ["calibrate", "absent.bvh", "--out", "subject.yaml"],
+    ["calibrate", "broken.bvh", "--out", "broken.bvh"],
     ["check", "absent.bvh"],
     ["check", "nao", "--robot-version", "v9"],
     ["check", "."],
@@ -61,6 +73,12 @@ def test_a_mistake_is_one_line_and_status_2(
     assert err.count("\n") == 1
     assert err.startswith("naoimitate")
     assert len(err) < 400
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["broken.bvh", "text.npz"]
+
+
+def test_a_motion_named_without_builtin_is_told_the_whole_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", "wave"]) == 2
+    assert "builtin:wave" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", [None, *sorted(cli.commands)])

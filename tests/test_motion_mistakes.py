@@ -107,7 +107,8 @@ def test_long_gaps_stay_open(tmp_path: Path) -> None:
     motion = read(tmp_path, lines_of(bvh(builtin_motion("squat"), Style(rate=50.0), 2), damaged))
     assert np.isnan(motion.landmarks[30]).all() and np.isfinite(motion.landmarks[70]).all()
     assert any("40 frames keep missing" in note for note in motion.notes)
-    assert describe(motion)["frames_with_gaps"] == 40
+    missing = describe(motion)["missing"]
+    assert list(missing) == list(LANDMARKS) and missing["l_knee"] == pytest.approx(40 / len(motion))
 
 
 def test_a_damaged_frame_is_a_gap_and_many_are_refused(tmp_path: Path) -> None:
@@ -175,7 +176,7 @@ def test_a_file_too_large_to_hold_and_one_of_two_people_are_refused(
 
 def test_a_unit_that_makes_nobody_is_replaced_by_a_usual_stature_and_said(tmp_path: Path) -> None:
     motion = read(tmp_path, bvh(builtin_motion("wave"), Style(unit=3e-5, rate=2.0), STEP))
-    assert describe(motion)["stature"] == pytest.approx(1.70, abs=0.01)
+    assert describe(motion)["person"]["stature"] == pytest.approx(1.70, abs=0.01)
     assert any("--unit" in note for note in motion.notes)
 
 
@@ -227,9 +228,10 @@ def test_a_bomb_of_entities_is_refused(tmp_path: Path) -> None:
 
 def test_facts_about_a_motion_are_plain_values(tmp_path: Path) -> None:
     facts = describe(read(tmp_path, text()))
-    assert facts["stature"] == pytest.approx(1.75, abs=0.01) and facts["rate"] == pytest.approx(2.0)
+    assert facts["person"]["stature"] == pytest.approx(1.75, abs=0.01) and facts["rate"] == pytest.approx(2.0)
     assert facts["segment_lengths"]["l_thigh"] == pytest.approx(0.245 * 1.75, abs=1e-3)
-    assert facts["missing"] == [] and facts["frames"] == 50
+    assert facts["missing"] == {} and facts["frames"] == 50
+    assert sum(facts["support"].values()) == pytest.approx(1.0) and abs(facts["lowest_foot"]) < 0.05
 
 
 @cache

@@ -213,6 +213,8 @@ WRONG_URDF = {
     "no robot": ("robot>", "model>", "not valid XML"),
     "limits reversed": ('lower="-0.05" upper="2.2"', 'lower="2.2" upper="-0.05"', "'l_knee'.*swap"),
     "no speed limit": ('velocity="5.0"', 'velocity="0"', "'head_pan'.*velocity"),
+    "limit no number": ('upper="2.2"', 'upper="wide"', "joint 'l_knee': <limit upper='wide'> is no number"),
+    "mass not finite": ('<mass value="0.95"/>', '<mass value="nan"/>', "is no number"),
     "no mass": ('<mass value="0.95"/>', '<mass value="0"/>', "the base link has no mass"),
     "impossible inertia": ('ixx="0.0028', 'ixx="0.28', "inertia that no body can have"),
     "sliding joint": (

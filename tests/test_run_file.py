@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import io
 import json
 import zipfile
 from pathlib import Path
@@ -106,6 +107,10 @@ BREAKS = {
     "provenance": {"provenance": "not json"},
     "format": {"format": "naoimitate-run/9"},
     "sim_q": {"sim_q": np.zeros((5, 2))},
+    "com ": {"com": np.full((5, 3), 1e300)},
+    "human_time ": {"human_time": np.array([0.0, 0.0, 0.0, 0.0, np.inf])},
+    "time  ": {"time": np.arange(5) * 1e-300},
+    "provenance ": {"provenance": "[" * 100_000},
 }
 
 
@@ -183,3 +188,42 @@ def test_provenance_holds_program_settings_hashes_and_seed() -> None:
     assert (value["program"], value["seed"], value["source_sha256"]) == ("naoimitate", 3, "ab")
     assert value["version"][0].isdigit()
     assert settings_of(text) == {"retarget": "planted", "margin": 0.025, "speed": "auto"}
+
+
+def members(path: Path) -> dict[str, bytes]:
+    save(make(), path)
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def rewrite(path: Path, contents: dict[str, bytes]) -> None:
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in contents.items():
+            archive.writestr(name, content)
+
+
+def test_a_small_file_that_claims_to_hold_terabytes_takes_no_memory(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f8", "fortran_order": False, "shape": (10**12, 3)})
+    rewrite(path, {**members(path), "q.npy": header.getvalue() + bytes(100)})
+    with pytest.raises(RunFileError, match="whole"):
+        load_run(path)
+
+
+def test_damaged_headers_are_one_clear_error_or_do_no_harm(tmp_path: Path) -> None:
+    path, rng = tmp_path / "run.npz", np.random.default_rng(3)
+    good = members(path)
+    refused = 0
+    for _ in range(150):
+        name = rng.choice(list(good))
+        bad = bytearray(good[name])
+        for place in rng.integers(0, 128, size=3):
+            bad[place] = rng.choice(list(b"\x00\xff('9 {}"))
+        rewrite(path, {**good, name: bytes(bad)})
+        try:
+            load_run(path)
+        except RunFileError as error:
+            assert "\n" not in str(error)
+            refused += 1
+    assert refused > 100

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import imageio.v2 as imageio
@@ -152,6 +155,42 @@ def test_a_broken_opengl_library_is_no_traceback(nao: RobotModel, monkeypatch: p
     monkeypatch.setattr(mujoco, "MjrContext", broken)
     with pytest.raises(RenderingUnavailable, match="gladLoadGL"):
         Stage(nao, 64, 64)
+
+
+def test_a_missing_software_renderer_does_not_spoil_the_others() -> None:
+    """In processes of their own, because MuJoCo and PyOpenGL read their variables when they are imported."""
+    code = """
+import importlib, os
+from naoimitate.core.errors import RenderingUnavailable
+from naoimitate.robot import load_robot
+from naoimitate.sim.gl import Canvas
+from naoimitate.sim.model import build_model
+from naoimitate.sim import gl
+real = importlib.import_module
+def absent(name):
+    real(name) if name == "mujoco.osmesa" else None
+    raise ImportError(name)
+gl.importlib.import_module = absent
+try:
+    Canvas(build_model(load_robot("nao")), 64, 64)
+except RenderingUnavailable as error:
+    assert "osmesa" in str(error), error
+    print(os.environ.get("PYOPENGL_PLATFORM"))
+"""
+    for chosen in ("osmesa", "nonsense", ""):
+        environment = {**os.environ, "MUJOCO_GL": chosen}
+        environment.pop("PYOPENGL_PLATFORM", None)
+        result = subprocess.run(
+            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+        )  # fmt: skip
+        assert result.stdout == "None\n", result.stderr
+
+
+def test_a_video_that_cannot_be_encoded_is_one_line(nao: RobotModel, tmp_path: Path, gl: None) -> None:
+    time, *poses = run(nao, 3)
+    with pytest.raises(RenderingUnavailable, match="No video") as error:
+        render_video(nao, time, *poses, tmp_path / "absent" / "run.mp4", fps=10.0)
+    assert "\n" not in str(error.value)
 
 
 def test_without_a_screen_the_software_renderers_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:

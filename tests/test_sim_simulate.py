@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from sim_poses import one_foot_pose
 
+from naoimitate.core.falling import TILT_LIMIT
 from naoimitate.robot import RobotModel
 from naoimitate.robot.model import Array
 from naoimitate.sim.placement import stand_on_floor
+from naoimitate.sim.sensors import roll_pitch
 from naoimitate.sim.simulate import SimResult, simulate
-from naoimitate.sim.survival import HEIGHT_LIMIT, TILT_LIMIT, has_fallen, roll_pitch, swing_load, tilt
 
 PERIOD = 0.01
 SAG = 1e-3
@@ -131,23 +132,6 @@ def test_frames_may_be_uneven_in_time(nao: RobotModel) -> None:
     assert result.base_pos[-1] == pytest.approx(base_pos, abs=1e-3)
 
 
-def test_fallen_means_tipped_sunk_or_carried_by_the_wrong_foot_and_lasts() -> None:
-    fine, low, heavy = np.zeros(4), np.array([1.0, HEIGHT_LIMIT - 0.01, 1.0, 1.0]), np.array([0.0, 0.0, 0.1, 0.0])
-    steep = np.array([0.0, 0.0, TILT_LIMIT + 0.01, 0.0])
-    ones = np.ones(4)
-    assert not has_fallen(fine, ones, fine).any()
-    assert has_fallen(fine, low, fine).tolist() == [False, True, True, True]
-    assert has_fallen(steep, ones, fine).tolist() == [False, False, True, True]
-    assert has_fallen(fine, ones, heavy).tolist() == [False, False, True, True]
-
-
-def test_swing_load_counts_the_foot_in_the_air_only() -> None:
-    load = np.array([[30.0, 20.0]] * 3)
-    np.testing.assert_allclose(swing_load(np.array(["D", "L", "R"]), load, 50.0), (0.0, 0.4, 0.6))
-
-
-def test_tilt_ignores_the_heading_and_roll_and_pitch_have_the_right_signs() -> None:
-    turned = np.array([np.cos(0.5), 0.0, 0.0, np.sin(0.5)])
-    assert tilt(np.array([1.0, 0.0, 0.0, 0.0]), turned) == pytest.approx(0.0, abs=1e-6)
+def test_roll_and_pitch_have_the_right_signs() -> None:
     np.testing.assert_allclose(roll_pitch(np.array([np.cos(0.1), np.sin(0.1), 0.0, 0.0])), (0.2, 0.0), atol=1e-12)
     np.testing.assert_allclose(roll_pitch(np.array([np.cos(0.1), 0.0, np.sin(0.1), 0.0])), (0.0, 0.2), atol=1e-12)

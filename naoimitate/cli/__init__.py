@@ -56,9 +56,19 @@ def run(arguments: Sequence[str]) -> int:
             return _closed_pipe()
         return _complain(str(error), error)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("naoimitate: interrupted", err=True)
-        return INTERRUPTED
+        return _interrupted()
+    except SystemError as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C while a compiled function was starting
+            return _interrupted()
+        raise
+    except MemoryError:
+        return _complain("not enough memory for this: give it less at a time, with --start and --end", MemoryError())
     return status if isinstance(status, int) else 0
+
+
+def _interrupted() -> int:
+    click.echo("naoimitate: interrupted", err=True)
+    return INTERRUPTED
 
 
 def _complain(message: str, error: Exception) -> int:

@@ -22,13 +22,16 @@ def calibrate(motion: str, out: Path, **reading: Any) -> None:
     """
     from naoimitate.calib.subject import calibrate as measure
     from naoimitate.calib.subject import save_subject
+    from naoimitate.cli.outputs import keep_apart, whole
     from naoimitate.core.errors import CalibrationError
 
+    keep_apart((motion, reading["skeleton"]), [out])
     person = read_motion(motion, **reading)
     if person.tpose is None:
         raise CalibrationError(f"{person.name} has no T-pose: give its moment with --tpose-at")
     subject = measure(person.tpose)
-    save_subject(subject, out)
+    with whole(out) as path:
+        save_subject(subject, path)
     body = subject.body
     click.echo(f"{out}: height {body.stature:.2f} m, arms {body.arm[0]:.2f} and {body.arm[1]:.2f} m, ", nl=False)
     click.echo(f"legs {body.leg[0]:.2f} and {body.leg[1]:.2f} m; {person.tpose_note}")

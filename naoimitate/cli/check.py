@@ -25,16 +25,20 @@ def check(source: str, robot_version: str | None, out: Path | None, **reading: A
     MOTION is a file or builtin:NAME; ROBOT is the name of a built-in one, or a folder. Says what was recognised and
     what is missing, and writes a picture.
     """
+    from naoimitate.cli.outputs import keep_apart, whole
     from naoimitate.core.errors import NaoimitateError
     from naoimitate.run.figures import as_png
 
+    keep_apart((source, reading["skeleton"]), [out])
     lines, figure = _robot(source, robot_version) if _is_robot(source) else _motion(source, reading)
+    click.echo("\n".join(lines))
     path = out or Path(f"{Path(source.replace(':', '-')).stem}-check.png")
     try:
-        path.write_bytes(as_png(figure))
+        with whole(path) as beside:
+            beside.write_bytes(as_png(figure))
     except OSError as error:
         raise NaoimitateError(f"cannot write {path}: {error.strerror}; choose another place with --out") from error
-    click.echo("\n".join([*lines, f"  picture: {path}"]))
+    click.echo(f"  picture: {path}")
 
 
 def _is_robot(source: str) -> bool:

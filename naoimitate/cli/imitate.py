@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     "--speed", type=types.FACTOR_OR_AUTO, default=1.0, show_default=True, help="auto: slower where the robot needs it."
 )
 @click.option("--rate", type=types.RUN_RATE, default=100.0, show_default=True, help="Commands a second.")
-@click.option("--sample", type=types.HERTZ, help="See the person only so often, as a camera would.")
+@click.option("--sample", type=types.SAMPLE_RATE, help="See the person only so often, as a camera would.")
 @click.option("--start", type=types.SECONDS, help="Begin at this moment of the motion.")
 @click.option("--end", type=types.SECONDS, help="End at this moment of the motion.")
 @motion_options
@@ -54,8 +54,10 @@ if TYPE_CHECKING:
 def imitate(motion: str, **options: Any) -> None:
     """Imitate a recorded motion.
 
-    MOTION is a file or builtin:NAME. Every frame of the run file is statically stable; 'naoimitate score' measures it.
+    MOTION is a file or builtin:NAME. Every frame of the run file is statically stable, but with --retarget direct;
+    'naoimitate score' measures it.
     """
+    from naoimitate.cli.outputs import keep_apart, whole
     from naoimitate.cli.progress import progress
     from naoimitate.cli.simulated import simulated, write_pictures
     from naoimitate.human.mirror import mirrored
@@ -64,6 +66,7 @@ def imitate(motion: str, **options: Any) -> None:
     from naoimitate.run.recorded import imitate as run_recorded
     from naoimitate.run.report import write_report
 
+    keep_apart((motion, options["subject"], options["skeleton"]), [options[key] for key in ("out", "video", "report")])
     robot = load_robot(options["robot"], options["robot_version"])
     person = read_motion(motion, **{key: options[key] for key in ("tpose_at", "fps", "unit", "up", "skeleton")})
     if options["mirror"]:
@@ -76,7 +79,8 @@ def imitate(motion: str, **options: Any) -> None:
     if options["video"]:
         write_pictures(run, robot, person, video=options["video"], strip=None)
     if options["report"]:
-        write_report(run, robot, options["report"])
+        with whole(options["report"]) as path:
+            write_report(run, robot, path)
     click.echo("\n".join(_summary(run, robot, options["out"], (*person.notes, person.tpose_note))))
 
 

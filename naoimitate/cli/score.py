@@ -22,12 +22,15 @@ def score(context: click.Context, run_file: Path, as_json: bool, check: bool, ro
 
     One line per measure of RUN.npz, with its bar and whether it is met.
     """
-    from naoimitate.robot import load_robot
+    from naoimitate.core.errors import RobotModelError
+    from naoimitate.robot import load_robot, robot_names
     from naoimitate.run.file import load_run
     from naoimitate.run.scores import score_run
     from naoimitate.run.sheet import as_dict, as_lines
 
     run = load_run(run_file)
+    if robot is None and run.robot not in robot_names():
+        raise RobotModelError(f"{run_file} is of the robot '{run.robot}', which is not built in: name it with --robot")
     sheet = score_run(run, load_robot(robot or run.robot, run.robot_version))
     click.echo(json.dumps(as_dict(sheet)) if as_json else "\n".join(as_lines(sheet)))
     if check and any(measure.passed is False for measure in sheet):

@@ -37,6 +37,7 @@ def write_pictures(
 
     Returns what was written. Without off-screen OpenGL nothing is, and a message on standard error says why.
     """
+    from naoimitate.cli.outputs import whole
     from naoimitate.cli.progress import progress
     from naoimitate.core.errors import RenderingUnavailable
     from naoimitate.sim.render import render_strip, render_video
@@ -45,13 +46,16 @@ def write_pictures(
     if run.sim_q is not None and run.sim_base_pos is not None and run.sim_base_quat is not None:
         q, base_pos, base_quat = run.sim_q, run.sim_base_pos, run.sim_base_quat
     seen: dict[str, Any] = {"human": motion, "human_time": run.human_time}
-    written = []
+    written: list[Path] = []
     try:
         if strip is not None:
-            written.append(render_strip(robot, run.time, q, base_pos, base_quat, strip, **seen))
+            with whole(strip) as path:
+                render_strip(robot, run.time, q, base_pos, base_quat, path, **seen)
+            written.append(strip)
         if video is not None:
-            with progress("drawing the video") as advance:
-                written.append(render_video(robot, run.time, q, base_pos, base_quat, video, **seen, progress=advance))
+            with progress("drawing the video") as advance, whole(video) as path:
+                render_video(robot, run.time, q, base_pos, base_quat, path, **seen, progress=advance)
+            written.append(video)
     except RenderingUnavailable as error:
         click.echo(f"naoimitate: {error}", err=True)
     return written

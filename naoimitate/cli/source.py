@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from naoimitate.cli.types import HERTZ, METRES, MOMENT
+from naoimitate.cli.types import FILE_RATE, METRES, MOMENT
 
 if TYPE_CHECKING:
     from naoimitate.core.frames import Motion
@@ -17,9 +17,13 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 OPTIONS = (
     click.option(
-        "--tpose-at", type=MOMENT, default="auto", help="Moment of the T-pose; none: the skeleton's rest pose."
+        "--tpose-at",
+        type=MOMENT,
+        default="auto",
+        show_default=True,
+        help="Moment of the T-pose; none: the skeleton's rest pose.",
     ),
-    click.option("--fps", type=HERTZ, help="Frame rate, where the file's own is wrong."),
+    click.option("--fps", type=FILE_RATE, help="Frame rate, where the file's own is wrong."),
     click.option("--unit", type=METRES, help="Metres per unit of the file."),
     click.option("--up", type=click.Choice(["y", "z"]), help="The file's axis that points up."),
     click.option(
@@ -47,7 +51,11 @@ def read_motion(
     up: str | None,
     skeleton: Path | None,
 ) -> Motion:
-    """The motion that a command was given."""
+    """The motion that a command was given. Raises MotionFormatError, also for a name that lacks ``builtin:``."""
+    from naoimitate.core.errors import MotionFormatError
     from naoimitate.motion import load_motion
+    from naoimitate.motion.builtin import builtin_names
 
+    if motion in builtin_names() and not Path(motion).exists():
+        raise MotionFormatError(f"there is no file '{motion}' here: for the built-in motion write builtin:{motion}")
     return load_motion(motion, tpose_at=tpose_at, fps=fps, unit=unit, up=up, skeleton=skeleton)

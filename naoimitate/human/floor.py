@@ -63,7 +63,7 @@ def _tilt_axes(xy: Array) -> Array:
     if len(xy) < 2:
         return np.zeros((0, 2))
     axes: Array = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2]
-    return axes[np.ptp(xy @ axes.T, axis=0) > SPAN_FOR_TILT]
+    return np.asarray(axes[np.ptp(xy @ axes.T, axis=0) > SPAN_FOR_TILT])
 
 
 def _search(points: Array, candidates: Mask, axes: Array) -> tuple[Array, Array]:

@@ -52,15 +52,15 @@ def last_mode(classes: npt.NDArray[np.str_]) -> npt.NDArray[np.str_]:
 
 
 def _on_level_floor(motion: Motion, floor: Floor) -> Motion:
-    """The motion, turned and lifted so that its floor is z = 0."""
+    """The motion, lifted so that its floor is z = 0 at the origin, and turned about that point until it is level."""
     up = np.array([-floor.slope[0], -floor.slope[1], 1.0])
     turn = Rotation.align_vectors([[0.0, 0.0, 1.0]], [up / np.linalg.norm(up)])[0]
-    height = _floor_height(motion.landmarks, floor) / np.linalg.norm(up)
+    height = _floor_height(motion.landmarks, floor)
 
     def moved(points: Array | None) -> Array | None:
         if points is None:
             return None
-        return np.asarray(turn.apply(points.reshape(-1, 3)).reshape(points.shape) - [0.0, 0.0, height])
+        return np.asarray(turn.apply((points - [0.0, 0.0, height]).reshape(-1, 3)).reshape(points.shape))
 
     degrees = np.degrees(turn.magnitude())
     landmarks = moved(motion.landmarks)

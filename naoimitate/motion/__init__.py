@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
 
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Motion
+from naoimitate.motion.stretch import stretch
 
 __all__ = ["load_motion"]
 
 BUILTIN = "builtin:"
 """Beginning of the names of built-in motions."""
-FRAMEWISE = ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")
-"""What a motion has one value of for each frame, beside the time."""
 
 
 def load_motion(
@@ -50,7 +46,7 @@ def load_motion(
 
         chosen = None if skeleton is None else Path(skeleton)
         motion = load_file(Path(name), Options(fps, unit, up, chosen, tpose_at))
-    return _cut(motion, start, end)
+    return stretch(motion, start, end)
 
 
 def _builtin(name: str, wishes: list[str]) -> Motion:
@@ -59,17 +55,3 @@ def _builtin(name: str, wishes: list[str]) -> Motion:
     if wishes:
         raise MotionFormatError(f"--{wishes[0]} is for files, the built-in motion {name} is exact: leave it away")
     return builtin_motion(name)
-
-
-def _cut(motion: Motion, start: float | None, end: float | None) -> Motion:
-    """The frames between two moments, at their own times."""
-    if start is None and end is None:
-        return motion
-    first, last = (0.0 if start is None else start), (math.inf if end is None else end)
-    inside = (motion.time >= first - 1e-9) & (motion.time <= last + 1e-9)
-    if math.isnan(first) or math.isnan(last) or not inside.any():
-        whole = f"{motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
-        raise MotionFormatError(f"no frame lies between {first:g} and {last:g} s: the motion goes from {whole}")
-    arrays = {name: getattr(motion, name) for name in FRAMEWISE}
-    kept: dict[str, Any] = {name: None if values is None else values[inside] for name, values in arrays.items()}
-    return replace(motion, time=motion.time[inside], **kept)

@@ -22,6 +22,8 @@ from naoimitate.motion.text import damaged, decode
 
 INCH = 0.0254
 """m; ASF lengths are inches times the header's ``length``."""
+ROOT_ORDER = ("tx", "ty", "tz", "rx", "ry", "rz")
+"""The root's numbers where the skeleton does not say their order."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +39,12 @@ class _Bone:
 
 @dataclass(frozen=True)
 class _Asf:
+    """parent: of each bone. order: of the root's six numbers. axis: order of its rotations. length: unit, inches."""
+
     bones: dict[str, _Bone]
     parent: dict[str, str]
+    order: tuple[str, ...]
+    axis: str
     length: float
     degrees: bool
 
@@ -50,13 +56,15 @@ def read_amc(path: Path, data: bytes, skeleton: Path | None) -> Clip:
     """
     asf_path = skeleton if skeleton is not None else _beside(path)
     try:
-        asf = _parse_asf(decode(asf_path.read_bytes()))
+        asf = _parse_asf(decode(asf_path.read_bytes()), asf_path.name)
     except OSError as error:
         raise MotionFormatError(f"the skeleton {asf_path} cannot be read: {error.strerror}") from error
     text = decode(data)
-    degrees = asf.degrees if ":RADIANS" not in text[:2000].upper() else False
+    marks = text[:2000].upper()
+    degrees = ":DEGREES" in marks or (asf.degrees and ":RADIANS" not in marks)
     frames, notes = _parse_amc(text)
     nodes, names = _skeleton(asf)
+    _check_fit(asf, frames, asf_path.name)
     root, local = _channels(asf, frames, names, degrees)
     positions, rotations = forward(nodes, root, local)
     notes.append(f"The skeleton is that of {asf_path.name}.")
@@ -76,27 +84,32 @@ def _beside(path: Path) -> Path:
     raise MotionFormatError(f"{path.name} needs its skeleton: name it with --skeleton FILE.asf")
 
 
-def _parse_asf(text: str) -> _Asf:
+def _parse_asf(text: str, name: str) -> _Asf:
     sections: dict[str, list[list[str]]] = {}
-    name = ""
+    section = ""
     for line in text.split("\n"):
         words = line.split("#")[0].split()
         if words and words[0].startswith(":"):
-            name = words[0].lower()
-            sections[name] = []
+            section = words[0].lower()
+            sections[section] = []
             words = words[1:]
-        if words and name:
-            sections[name].append(words)
+        if words and section:
+            sections[section].append(words)
     try:
         units = {words[0].lower(): words[1] for words in sections.get(":units", []) if len(words) > 1}
         degrees = units.get("angle", "deg").lower().startswith("deg")
         bones = dict(_bone(block, degrees) for block in _blocks(sections[":bonedata"]))
         parent = {child: words[0] for words in sections[":hierarchy"] for child in words[1:]}
-        asf = _Asf(bones, parent, float(units.get("length", 1.0)), degrees)
+        root = {words[0].lower(): [w.lower() for w in words[1:]] for words in sections.get(":root", [])}
+        order, axis = tuple(root.get("order", ROOT_ORDER)), root.get("axis", ["xyz"])[0]
+        if sorted(order) != sorted(ROOT_ORDER) or sorted(axis) != ["x", "y", "z"]:
+            raise ValueError("root")
+        asf = _Asf(bones, parent, order, axis, float(units.get("length", 1.0)), degrees)
     except (KeyError, ValueError, IndexError, StopIteration) as error:
-        raise MotionFormatError(f"the ASF skeleton is damaged ({error}): get the complete file") from error
+        where = f"no {error.args[0]}" if isinstance(error, KeyError) else str(error)
+        raise MotionFormatError(f"the ASF skeleton {name} is damaged ({where}): get the complete file") from error
     if not bones or not np.isfinite([b.offset for b in bones.values()]).all() or not np.isfinite(asf.length):
-        raise MotionFormatError("the ASF skeleton has no bones with finite lengths: get the complete file")
+        raise MotionFormatError(f"the ASF skeleton {name} has no bones with finite lengths: get the complete file")
     return asf
 
 
@@ -190,18 +203,27 @@ def _complete(frame: dict[str, list[float]], shape: dict[str, int]) -> bool:
     return bool(frame) and all(n > 0 and len(frame.get(name, [])) == n for name, n in shape.items())
 
 
+def _check_fit(asf: _Asf, frames: list[dict[str, list[float]]], name: str) -> None:
+    """Raise MotionFormatError when the motion is that of another skeleton."""
+    moves = {bone: count for bone, count in _usual_shape(frames).items() if bone != "root"}
+    can = {bone: len(asf.bones[bone].dof) for bone in asf.bones if asf.bones[bone].dof}
+    for bone in [*moves, *can]:
+        if moves.get(bone) != can.get(bone):
+            raise MotionFormatError(f"the bone {bone} does not move like that of {name}: name its own with --skeleton")
+
+
 def _channels(asf: _Asf, frames: list[dict[str, list[float]]], names: list[str], degrees: bool) -> tuple[Array, Array]:
     """Root positions (T, 3) and rotations of the nodes against their parents (T, J, 3, 3)."""
     table = {name: np.array([frame[name] for frame in frames]) for name in _usual_shape(frames)}
     local = np.tile(np.eye(3), (len(frames), len(names), 1, 1))
-    root = _padded(table["root"], 6)
-    local[:, 0] = _turns("XYZ", root[:, 3:6], degrees)
+    root = _padded(table["root"], 6)[:, [asf.order.index(name) for name in ROOT_ORDER]]
+    local[:, 0] = _turns(asf.axis, root[:, 3:], degrees)
     for i, name in enumerate(names[1:], 1):
         if name not in table or not name:
             continue
         bone = asf.bones[name]
         angles = np.zeros((len(frames), 3))
-        for column, dof in enumerate(bone.dof[: table[name].shape[1]]):
+        for column, dof in enumerate(bone.dof):
             if dof in ("rx", "ry", "rz"):
                 angles[:, "xyz".index(dof[1])] = table[name][:, column]
         local[:, i] = bone.axis @ _turns(bone.order, angles, degrees) @ bone.axis.T
@@ -218,7 +240,7 @@ def _turns(order: str, xyz: Array, degrees: bool) -> Array:
     """Rotations (T, 3, 3) of angles about fixed axes, taken in the given order; NaN where an angle is not finite."""
     good = np.isfinite(xyz).all(axis=1)
     turned = np.full((len(xyz), 3, 3), np.nan)
-    columns = ["XYZ".index(a) for a in order]
+    columns = ["xyz".index(a) for a in order.lower()]
     if good.any():
         turned[good] = Rotation.from_euler(order.lower(), xyz[good][:, columns], degrees=degrees).as_matrix()
     return turned

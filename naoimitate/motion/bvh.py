@@ -1,9 +1,10 @@
 """Biovision BVH files. The hierarchy and the Euler angles are pybvh's; what pybvh 0.9 refuses is put right before.
 
 pybvh refuses joints with position channels (MotionBuilder, Axis Neuron, Blender), joints with fewer than three
-rotations, other orders of the root's positions, names with spaces, text that is not UTF-8, and files whose number of
-frames is not the declared one (cut off). Its forward kinematics takes the root's channels as absolute and leaves the
-root's OFFSET out, as exporters mean it; but it gives no rotations, so that ``clip.forward`` is used.
+rotations, other orders of the root's positions, names with spaces, keywords in other cases, text that is not UTF-8, and
+files whose number of frames is not the declared one (cut off). Its forward kinematics takes the root's channels as
+absolute and leaves the root's OFFSET out, as exporters mean it; but it gives no rotations, so that ``clip.forward`` is
+used.
 """
 
 from __future__ import annotations
@@ -28,8 +29,11 @@ RELATIVE_ROOT = (0.05, 0.3)
 """Root channels that start within the first share of the skeleton's size, with an OFFSET beyond the second, are
 relative to the OFFSET."""
 
-_FRAME_TIME = re.compile(r"^[ \t]*Frame[ \t]+Time:[ \t]*(\S*)[^\n]*$", re.MULTILINE)
-_FRAMES = re.compile(r"^[ \t]*Frames:[ \t]*(\d{1,12})", re.MULTILINE)
+_LOOSE = re.MULTILINE | re.IGNORECASE
+_FRAME_TIME = re.compile(r"^[ \t]*Frame[ \t]*Time[ \t]*:[ \t]*(\S*)[^\n]*$", _LOOSE)
+_FRAMES = re.compile(r"^[ \t]*Frames[ \t]*:[ \t]*(\d{1,12})", _LOOSE)
+_KEYWORD = re.compile(r"^[ \t]*(HIERARCHY|ROOT|JOINT|End Site|OFFSET|CHANNELS|MOTION)\b", _LOOSE)
+_WITHOUT_CHANNELS = re.compile(r"^((?:ROOT|JOINT)[^\n]*\n{\nOFFSET[^\n]*\n)(?!CHANNELS)", re.MULTILINE)
 _CHANNELS = re.compile(r"^[ \t]*CHANNELS[ \t]+\d+([^\n]*)$", re.MULTILINE)
 _NAME = re.compile(r"^([ \t]*(?:ROOT|JOINT)[ \t]+)([^\n{]+)", re.MULTILINE)
 
@@ -56,15 +60,16 @@ def read_bvh(text: str) -> Clip:
     """
     header, body = _split(text)
     skeleton = _hierarchy(header)
-    table, notes = numbers(body, sum(len(block) for block in header.channels))
+    table, notes = numbers(_with_points(body), sum(len(block) for block in header.channels), header.frames)
     if header.frames is not None and header.frames != len(table):
-        notes.append(f"The header declares {header.frames} frames, {len(table)} complete ones are there and were read.")
-    root, angles, skeleton = _columns(table, header, skeleton)
+        notes.append(f"The header declares {header.frames} frames, the file has {len(table)} complete ones.")
+    angles, places = _columns(table, header, skeleton)
+    root, skeleton, moving = _in_parents(skeleton, places)
     local = np.tile(np.eye(3), (len(table), len(skeleton), 1, 1))
     with np.errstate(invalid="ignore", over="ignore"):
         local[:, ~skeleton.ends] = euler_to_rotmat(angles, header.orders, degrees=True)
     root, root_notes = _root_path(root, skeleton)
-    positions, rotations = forward(skeleton, root, local)
+    positions, rotations = forward(skeleton, root, local, moving)
     return Clip("BVH", skeleton, positions, rotations, rate=header.rate, notes=tuple(notes + root_notes))
 
 
@@ -73,7 +78,7 @@ def _split(text: str) -> tuple[_Header, str]:
     found = _FRAME_TIME.search(text)
     if found is None:
         raise MotionFormatError("the BVH file ends before its motion: get the complete file")
-    head = text[: found.start()]
+    head = _canonical(_with_points(text[: found.start()]))
     channels = [tuple(m.group(1).split()) for m in _CHANNELS.finditer(head)]
     if not channels or sum(map(len, channels)) > MAX_CHANNELS:
         raise MotionFormatError("the BVH file has no readable hierarchy of joints: export it again")
@@ -84,10 +89,25 @@ def _split(text: str) -> tuple[_Header, str]:
     return _Header(head, channels, frames, _rate(found.group(1))), text[found.end() :]
 
 
+def _with_points(text: str) -> str:
+    """Text with decimal points where its numbers have decimal commas, and without commas between numbers."""
+    if "," not in text:
+        return text
+    return text.replace(",", " ") if re.search(r"\d\.\d", text) else re.sub(r"(?<=\d),(?=\d)", ".", text)
+
+
+def _canonical(head: str) -> str:
+    """The hierarchy with each keyword and brace on a line of its own, and channels, perhaps none, for every joint."""
+    head = "\n".join(" ".join(line.split()) for line in re.sub(r"[{}]", r"\n\g<0>\n", head).split("\n") if line.strip())
+    head = re.sub(r" (?=(?:OFFSET|CHANNELS) [-+.\d])", "\n", head, flags=re.IGNORECASE)
+    head = _KEYWORD.sub(lambda m: "End Site" if m.group(1)[:3].lower() == "end" else m.group(1).upper(), head)
+    return _WITHOUT_CHANNELS.sub(r"\1CHANNELS 0\n", head)
+
+
 def _rate(frame_time: str) -> float | None:
     """Hz; a frame time that was cut to six or seven digits is meant as a whole number of Hz (120.005 -> 120)."""
     try:
-        step = float(frame_time)
+        step = float(frame_time.replace(",", "."))
     except ValueError:
         return None
     if not 1e-6 < step < 1e6:
@@ -131,34 +151,37 @@ def _hierarchy(header: _Header) -> Skeleton:
     return skeleton
 
 
-def _columns(table: Array, header: _Header, skeleton: Skeleton) -> tuple[Array, Array, Skeleton]:
-    """Root positions (T, 3), angles (T, N, 3) in deg in each joint's order, and the skeleton as the channels say."""
-    root, angles = np.zeros((len(table), 3)), np.zeros((len(table), len(header.channels), 3))
-    offsets, orders, column = skeleton.offsets.copy(), header.orders, 0
+def _columns(table: Array, header: _Header, skeleton: Skeleton) -> tuple[Array, dict[int, Array]]:
+    """Angles (T, N, 3) in deg in each joint's order, and position channels (T, 3) by the node of their joint."""
+    angles, orders, column = np.zeros((len(table), len(header.channels), 3)), header.orders, 0
+    places = {0: np.zeros((len(table), 3))}
     for i, (node, block) in enumerate(zip(np.flatnonzero(~skeleton.ends), header.channels, strict=True)):
-        place = np.zeros((len(table), 3))
         for channel in block:
             axis = channel[0].upper()
             if channel.lower().endswith("rotation"):
                 angles[:, i, orders[i].index(axis)] = table[:, column]
             else:
+                place = places.setdefault(int(node), np.zeros((len(table), 3)))
                 place[:, "XYZ".index(axis)] = table[:, column]
             column += 1
-        if i == 0:
-            root = place
-        else:
-            offsets[node] = _offset(offsets[node], place)
-    return root, angles, replace(skeleton, offsets=offsets)
+    return angles, places
 
 
-def _offset(offset: Array, place: Array) -> Array:
-    """Where a joint with position channels (T, 3) is in its parent: bones do not stretch, so at their median.
+def _in_parents(skeleton: Skeleton, places: dict[int, Array]) -> tuple[Array, Skeleton, dict[int, Array]]:
+    """The root's channels (T, 3), the skeleton with bones as the channels say, and joints that move in their parents.
 
-    Channels that stay at zero are relative to the OFFSET.
+    Programs that put a reference above the hips have the person's path in the channels of the hips.
     """
-    known = place[np.isfinite(place).all(axis=1)]
-    median = np.median(known, axis=0) if len(known) else np.zeros(3)
-    return offset if np.linalg.norm(median) <= 1e-3 * np.linalg.norm(offset) else median
+    offsets, moving = skeleton.offsets.copy(), {}
+    for node, place in places.items():
+        if node == 0:
+            continue
+        known = place[np.isfinite(place).all(axis=1)]
+        median = np.median(known, axis=0) if len(known) else np.zeros(3)
+        if np.linalg.norm(median) < np.linalg.norm(median - offsets[node]):  # relative to the OFFSET, or without use
+            place, median = place + offsets[node], median + offsets[node]
+        offsets[node], moving[node] = median, place
+    return places[0], replace(skeleton, offsets=offsets), moving
 
 
 def _root_path(root: Array, skeleton: Skeleton) -> tuple[Array, list[str]]:

@@ -37,14 +37,17 @@ class Calibration:
 def calibrate(scene: Scene, time: Array, rate: float, tpose_at: float | str) -> Calibration:
     """Find or make the T-pose of a recording whose frames are at ``time`` (T,) s.
 
-    Raises MotionFormatError when the moment asked for is not in the file.
+    Raises MotionFormatError when the moment asked for is not in the file, or nobody stands at it.
     """
     if isinstance(tpose_at, (int, float)):
-        return _asked(scene, time, float(tpose_at))
-    if tpose_at not in ("auto", "none"):
+        chosen = _asked(scene, time, float(tpose_at))
+    elif tpose_at in ("auto", "none"):
+        chosen = (_found(scene, time, rate) if tpose_at == "auto" else None) or _made(scene, time)
+    else:
         raise MotionFormatError(f"the T-pose moment {tpose_at!r} is unknown: give seconds, auto or none")
-    found = _found(scene, time, rate) if tpose_at == "auto" else None
-    return found or _made(scene, time)
+    if not _is_whole(chosen.reference.landmarks):
+        raise MotionFormatError("the person does not stand where the T-pose is taken: say --tpose-at or --up")
+    return chosen
 
 
 def calibration_frame(who: Person, calibration: Calibration, place: Array) -> HumanFrame:
@@ -62,7 +65,7 @@ def calibration_frame(who: Person, calibration: Calibration, place: Array) -> Hu
 
 def _found(scene: Scene, time: Array, rate: float) -> Calibration | None:
     """The file's own T-pose, an added first frame, or one that is held."""
-    if scene.tpose is not None:
+    if scene.tpose is not None and bool(is_tpose(scene.tpose.landmarks)[0]):
         reference = from_frame(scene.tpose, 0, scene.rest)
         return Calibration(reference, scene.tpose, None, "The T-pose is the file's own calibration posture.")
     if scene.added and bool(is_tpose(scene.motion.landmarks[:1])[0]):

@@ -102,11 +102,14 @@ class Clip:
         return Posture(self.skeleton.rest, np.tile(np.eye(3), (len(self.skeleton), 1, 1)))
 
 
-def forward(skeleton: Skeleton, root: Array, local: Array) -> tuple[Array, Array]:
+def forward(
+    skeleton: Skeleton, root: Array, local: Array, moving: dict[int, Array] | None = None
+) -> tuple[Array, Array]:
     """Forward kinematics of whole clips.
 
     root: (T, 3) position of the root. local: (T, J, 3, 3) rotation of every node against its parent (identity for
-    ends). Returns positions (T, J, 3) and rotations (T, J, 3, 3) in the world.
+    ends). moving: places (T, 3) in their parents of nodes that have no fixed offset. Returns positions (T, J, 3) and
+    rotations (T, J, 3, 3) in the world.
     """
     positions, rotations = np.empty((*local.shape[:2], 3)), np.empty_like(local)
     with np.errstate(over="ignore", invalid="ignore"):
@@ -114,6 +117,7 @@ def forward(skeleton: Skeleton, root: Array, local: Array) -> tuple[Array, Array
             if parent < 0:
                 positions[:, i], rotations[:, i] = root, local[:, i]
             else:
-                positions[:, i] = positions[:, parent] + rotations[:, parent] @ skeleton.offsets[i]
+                place = (moving or {}).get(i, skeleton.offsets[i])
+                positions[:, i] = positions[:, parent] + (rotations[:, parent] @ place[..., None])[..., 0]
                 rotations[:, i] = rotations[:, parent] @ local[:, i]
     return positions, rotations

@@ -37,6 +37,8 @@ ENDS = {
     "LeftToe": "pLeftToe",
 }
 """Bony points that end the last segments."""
+NUMBER = "number"
+"""Among the values of a frame its place in the recording, which counts lost frames, too."""
 
 
 @dataclass
@@ -48,7 +50,6 @@ class _File:
     contacts: dict[int, str] = field(default_factory=dict)
     rate: float | None = None
     frames: dict[str, list[dict[str, list[float]]]] = field(default_factory=dict)
-    index: list[int] = field(default_factory=list)
     broken: bool = False
 
 
@@ -75,7 +76,7 @@ def read_mvnx(data: bytes) -> Clip:
         posture = Posture(*(part[0] for part in _with_ends(skeleton, *tposes)))
     notes = [] if not file.broken else [f"The file is cut off; its {len(frames)} complete frames were read."]
     return Clip(
-        "MVNX", skeleton, positions, rotations, rate=file.rate, time=_time(file, len(frames)), unit=1.0, up="z",
+        "MVNX", skeleton, positions, rotations, rate=file.rate, time=_time(file.rate, frames), unit=1.0, up="z",
         tpose=posture, contacts=_contacts(file, frames), com=_com(frames), notes=tuple(notes),
     )  # fmt: skip
 
@@ -87,7 +88,7 @@ def _collect(data: bytes) -> _File:
             io.BytesIO(data), events=("end",), resolve_entities=False, no_network=True, load_dtd=False
         ):
             if isinstance(element.tag, str):
-                _take(file, etree.QName(element).localname, element)
+                _take(file, _local(element.tag), element)
     except etree.XMLSyntaxError as error:
         file.broken = True
         if not file.frames.get("normal"):
@@ -95,6 +96,11 @@ def _collect(data: bytes) -> _File:
                 "the MVNX file is cut off or damaged before its motion: get the complete file"
             ) from error
     return file
+
+
+def _local(tag: str) -> str:
+    """The name of a tag without its name space; damaged ones have any letters."""
+    return tag.rpartition("}")[2]
 
 
 def _take(file: _File, tag: str, element: etree._Element) -> None:
@@ -107,7 +113,7 @@ def _take(file: _File, tag: str, element: etree._Element) -> None:
             if len(position) == 3:
                 file.points[name, point.get("label", "")] = position
     elif tag == "contactDefinition":
-        file.contacts[int(element.get("index", "-1"))] = element.get("label", "")
+        file.contacts[_number(element, len(file.contacts))] = element.get("label", "")
     elif tag == "subject" or (tag == "segments" and file.rate is None):
         _take_rate(file, element)
     elif tag == "frame":
@@ -124,18 +130,22 @@ def _take_rate(file: _File, element: etree._Element) -> None:
 
 def _take_frame(file: _File, element: etree._Element) -> None:
     kind = element.get("type") or "normal"
-    values = {etree.QName(child).localname: _floats(child.text) for child in element if isinstance(child.tag, str)}
+    values = {_local(child.tag): _floats(child.text) for child in element if isinstance(child.tag, str)}
     planted = [c.get("segment", "") for c in element.iter("{*}contact")]
     if planted:
         values["contactSegments"] = [
             float(any("Left" in p for p in planted)),
             float(any("Right" in p for p in planted)),
         ]
-    file.frames.setdefault(kind, []).append(values)
-    if kind == "normal":
-        number = element.get("index", "")
-        file.index.append(int(number) if number.isdigit() else len(file.index))
+    kept = file.frames.setdefault(kind, [])
+    kept.append({**values, NUMBER: [_number(element, len(kept))]})
     element.clear()
+
+
+def _number(element: etree._Element, otherwise: int) -> int:
+    """The index that an element has, or the one that it would have by its place."""
+    index = element.get("index", "")
+    return int(index) if index.isascii() and index.isdigit() and len(index) < 10 else otherwise
 
 
 def _floats(text: str | None) -> list[float]:
@@ -189,12 +199,12 @@ def _with_ends(skeleton: Skeleton, positions: Array, rotations: Array) -> tuple[
     return np.concatenate([positions, tips], axis=1), np.concatenate([rotations, rotations[:, above]], axis=1)
 
 
-def _time(file: _File, frames: int) -> Array | None:
+def _time(rate: float | None, frames: list[dict[str, list[float]]]) -> Array | None:
     """Time by the frames' numbers, so that a frame which Xsens lost leaves a gap, not a jerk."""
-    index = np.array(file.index[:frames], dtype=np.float64)
-    if file.rate is None or file.rate <= 0.0 or len(index) < 2 or (np.diff(index) <= 0.0).any():
+    index = np.array([f[NUMBER][0] for f in frames])
+    if rate is None or not rate > 0.0 or len(index) < 2 or (np.diff(index) <= 0.0).any():
         return None
-    return np.asarray((index - index[0]) / file.rate)
+    return np.asarray((index - index[0]) / rate)
 
 
 def _contacts(file: _File, frames: list[dict[str, list[float]]]) -> npt.NDArray[np.bool_] | None:
@@ -202,7 +212,7 @@ def _contacts(file: _File, frames: list[dict[str, list[float]]]) -> npt.NDArray[
     if all("contactSegments" in f for f in frames):
         return np.array([f["contactSegments"] for f in frames]) > 0.5
     sides = [[i for i, label in file.contacts.items() if label.startswith(side)] for side in ("Left", "Right")]
-    if not all(sides) or min(min(sides)) < 0:
+    if not all(sides):
         return None
     flags = [f.get("footContacts", []) for f in frames]
     if any(len(f) <= max(max(sides[0]), max(sides[1])) for f in flags):

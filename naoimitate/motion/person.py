@@ -59,10 +59,7 @@ def _head_above_joint(reference: Reference, size: Anthropometry) -> float:
     """Height of the head's centre over its joint, m; some skeletons have that joint down between the shoulders."""
     joint = reference.landmarks[LANDMARK["head"], 2]
     shoulders = 0.5 * (reference.landmarks[LANDMARK["l_shoulder"], 2] + reference.landmarks[LANDMARK["r_shoulder"], 2])
-    from_shoulders = float(shoulders + size.neck - joint)
-    return (
-        max(HEAD_CENTRE * reference.stature, from_shoulders) if joint < shoulders else HEAD_CENTRE * reference.stature
-    )
+    return max(HEAD_CENTRE * reference.stature, float(shoulders + size.neck - joint))
 
 
 def landmarks_of(who: Person, track: Track) -> Array:

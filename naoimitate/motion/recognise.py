@@ -20,6 +20,8 @@ POSTURES = 50
 """So many postures of a recording are enough to tell left from right."""
 SHORT = 0.02
 """Bones below this share of a leg have no direction."""
+TOES = 0.25
+"""What is beyond the ball of a foot by more than this share of a leg is no toe (CMU's skeletons: 0.08)."""
 
 
 @dataclass(frozen=True)
@@ -150,9 +152,10 @@ def _toe_tip(skeleton: Skeleton, nodes: dict[str, int], side: str) -> int | None
     toe = nodes.get(f"{side}_toe")
     if toe is None:
         return None
+    leg = leg_length(skeleton, nodes)
     beyond = {i: bone_length(skeleton, toe, i) for i in skeleton.below(toe)}
-    tip = max(beyond, key=beyond.__getitem__)
-    return tip if beyond[tip] > SHORT * leg_length(skeleton, nodes) else None
+    toes = [i for i, far in beyond.items() if SHORT * leg < far < TOES * leg]
+    return max(toes, key=beyond.__getitem__, default=None)
 
 
 def _middle_one(skeleton: Skeleton, nodes: list[int]) -> int:

@@ -43,11 +43,14 @@ def from_frame(track: Track, frame: int, rest: Track) -> Reference:
     """Straighten the posture of one frame, z up, in which the person stands with flat feet.
 
     Where the feet point is told by the rest pose, in which they point ahead, or by the line from ankle to toe.
+    Somebody who lies on a side is straightened along the own body.
     """
     landmarks, turns = track.landmarks[frame], track.turns[frame]
     left = across(landmarks)
     up = np.array([0.0, 0.0, 1.0])
-    reference = _straightened(landmarks, turns, np.column_stack([np.cross(left, up), left, up]), feet_hang=False)
+    standing = np.column_stack([np.cross(left, up), left, up])
+    axes = standing if np.isfinite(left).all() else _body_axes(landmarks)
+    reference = _straightened(landmarks, turns, standing if axes is None else axes, feet_hang=False)
     return _feet_ahead(reference, from_rest(rest))
 
 
@@ -68,7 +71,7 @@ def _feet_ahead(reference: Reference, rest: Reference | None) -> Reference:
 def from_rest(rest: Track) -> Reference | None:
     """Straighten the rest pose; None when nobody stands like that (all bones along one axis, limbs folded)."""
     landmarks, turns = rest.landmarks[0], rest.turns[0]
-    axes = _rest_axes(landmarks)
+    axes = _body_axes(landmarks)
     if axes is None or not _is_human(landmarks @ axes):
         return None
     return _straightened(landmarks, turns, axes, feet_hang=True)
@@ -89,8 +92,8 @@ def best_standing_frame(landmarks: Array) -> int:
     return int(np.argmin(cost))
 
 
-def _rest_axes(landmarks: Array) -> Array | None:
-    """World axes (3, 3) of a rest pose as columns: forward, left, up; the file's own axes where they are near."""
+def _body_axes(landmarks: Array) -> Array | None:
+    """World axes (3, 3) of a posture as columns: forward, left, up of the body; the file's axes where they are near."""
     shoulders = landmarks[LANDMARK["l_shoulder"]] + landmarks[LANDMARK["r_shoulder"]]
     up = _snapped(0.5 * shoulders - landmarks[LANDMARK["pelvis"]])
     left = landmarks[LANDMARK["l_hip"]] - landmarks[LANDMARK["r_hip"]]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
-
 import numpy as np
 import numpy.typing as npt
 
@@ -96,10 +94,3 @@ def teleports(landmarks: Array, time: Array) -> str:
     moments = ", ".join(f"{time[i + 1]:.2f} s" for i in jumps[:3]) + (", ..." if len(jumps) > 3 else "")
     farthest = float(step[jumps].max())
     return f"The person jumps up to {farthest:.2f} m between two frames at {moments}; kept as recorded."
-
-
-def missing(landmarks: Array) -> list[str]:
-    """Landmarks that are in no frame."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        return [name for name in LANDMARKS if not np.isfinite(landmarks[:, LANDMARK[name]]).all(axis=-1).any()]

@@ -23,10 +23,16 @@ HOLD = 0.4
 STILL = 0.25
 """m/s: wrists that hold a pose are slower."""
 
+ON_A_SIDE = 0.95
+"""Sine of the slope of the line from right to left, from which on somebody lies on a side."""
 JUMP = 0.12
 """m that a landmark moves against the pelvis (or the pelvis itself) from an added frame to the next, at least."""
 JUMP_FACTOR = 5.0
 """The same in median steps of the clip."""
+SAME = 1e-4
+"""m: landmarks that move less from frame to frame were copied, nobody stands so still."""
+SUDDEN = 0.9
+"""Who moves out of a T-pose that is held gains speed: the first step is less than this share of the second."""
 TRANSIENT = 0.02
 """m by which the steps of a filter's transient change within ``LAG`` frames."""
 LAG = 3
@@ -44,14 +50,19 @@ def angle(a: Array, b: Array) -> Array:
 
 
 def across(landmarks: Array) -> Array:
-    """Horizontal unit direction (..., 3) to the person's left, the mean of the lines of hips and shoulders, z up."""
+    """Horizontal unit direction (..., 3) to the person's left, the mean of the lines of hips and shoulders, z up.
+
+    NaN where these lines are nearly vertical: of somebody who lies on a side.
+    """
     total = np.zeros((*landmarks.shape[:-2], 3))
     for part in ("hip", "shoulder"):
         line = landmarks[..., LANDMARK[f"l_{part}"], :] - landmarks[..., LANDMARK[f"r_{part}"], :]
         total += line / np.maximum(np.linalg.norm(line, axis=-1, keepdims=True), 1e-9)
+    slope = np.abs(total[..., 2:]) / np.maximum(np.linalg.norm(total, axis=-1, keepdims=True), 1e-9)
     total[..., 2] = 0.0
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(total / np.linalg.norm(total, axis=-1, keepdims=True))
+        level = total / np.linalg.norm(total, axis=-1, keepdims=True)
+    return np.where(slope < ON_A_SIDE, level, np.nan)
 
 
 def heading(landmarks: Array) -> float:
@@ -83,16 +94,21 @@ def is_tpose(landmarks: Array) -> npt.NDArray[np.bool_]:
 def added_frames(track: Track) -> int:
     """How many frames at the start are no motion: an added T-pose or rest pose, and a filter's transient after it.
 
-    Told from the data: the first posture is one of the two, and from it to the next the person jumps. A transient
-    lasts as long as the steps between frames change by more than they do later.
+    Told from the data: the first posture is one of the two, perhaps some times over, and from it to the next the
+    person jumps. A transient lasts as long as the steps between frames change by more than they do later.
     """
-    n = len(track)
-    if n < 3 or not (bool(is_tpose(track.landmarks[:1])[0]) or _is_rest(track)):
+    if len(track) < 3 or not (bool(is_tpose(track.landmarks[:1])[0]) or _is_rest(track)):
         return 0
     posture = track.landmarks - track.landmarks[:, LANDMARK["pelvis"], None]
     steps = np.diff(np.concatenate([posture, track.landmarks[:, LANDMARK["pelvis"], None]], axis=1), axis=0)
-    size = np.nan_to_num(np.linalg.norm(steps, axis=-1), nan=0.0).max(axis=1)
-    if size[0] < max(JUMP, JUMP_FACTOR * float(np.median(size[1:]))):
+    moved = np.linalg.norm(steps, axis=-1)
+    seen = np.isfinite(moved).sum(axis=1)
+    size = np.nan_to_num(moved, nan=0.0).max(axis=1)
+    copies = int(np.argmax((size > SAME) | (seen < seen.max())))
+    steps, size = steps[copies:], size[copies:]
+    if len(size) < 2 or size[0] < max(JUMP, JUMP_FACTOR * float(np.median(size[1:]))):
+        return 0
+    if copies and size[0] < SUDDEN * size[1]:
         return 0
     change = np.nan_to_num(np.linalg.norm(steps[LAG:] - steps[:-LAG], axis=-1), nan=0.0).max(axis=1)
     later = change[LONGEST_TRANSIENT : 2 * LONGEST_TRANSIENT]
@@ -101,7 +117,7 @@ def added_frames(track: Track) -> int:
     for frame in range(1, min(LONGEST_TRANSIENT, len(change))):
         if change[frame] > limit and frame - last <= 2:
             last = frame
-    return last + 1
+    return copies + last + 1
 
 
 def _is_rest(track: Track) -> bool:

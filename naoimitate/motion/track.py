@@ -78,9 +78,9 @@ def _extract(positions: Array, rotations: Array, rest: Array, anatomy: Anatomy) 
         turns[:, SEGMENT[f"{side}_hand"]] = rotations[:, palm]
         turns[:, SEGMENT[f"{side}_foot"]] = rotations[:, anatomy.nodes[f"{side}_ankle"]]
     tips = np.full((len(positions), len(SIDES), 3), np.nan)
-    for side, tip in enumerate(anatomy.tips):
+    for foot, tip in enumerate(anatomy.tips):
         if tip is not None:
-            tips[:, side] = positions[:, tip]
+            tips[:, foot] = positions[:, tip]
     return Track(landmarks, turns, tips)
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from naoimitate.core.errors import MotionFormatError
-from naoimitate.core.frames import LANDMARK, SIDES, Array
+from naoimitate.core.frames import LANDMARK, SIDES
 from naoimitate.human.body import LEG_BY_STATURE
 from naoimitate.motion.track import Track
 
@@ -15,6 +15,7 @@ CMU_UNIT = 0.0254 / 0.45
 """m; CMU's skeletons are in inches times 0.45 (header of its ASF files)."""
 UNITS = {
     "metres": 1.0,
+    "decimetres": 0.1,
     "centimetres": 0.01,
     "millimetres": 0.001,
     "inches": 0.0254,
@@ -28,6 +29,8 @@ USUAL_STATURE = 1.70
 """m: between units that all give a possible person, the one that gives the most usual person is taken."""
 Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Turns y up to z up."""
+HELD = 0.3
+"""A pelvis that stays nearer to the origin than this share of the legs' length is held there."""
 SURE = 0.75
 """Share of the body's length along an axis above which that axis is called its up axis."""
 
@@ -84,7 +87,7 @@ def up_axis(track: Track, rest: Track, declared: str | None, asked: str | None) 
     if moving is None or standing is None or moving == standing:
         axis = moving or standing or "y"
         return axis, f"Up is the file's {axis} axis: the person stands along it."
-    axis = min((moving, standing), key=lambda a: _floor_unrest(track.landmarks[..., "xyz".index(a)]))
+    axis = min((moving, standing), key=lambda a: _floor_unrest(track, "xyz".index(a)))
     return (
         axis,
         f"Up is the file's {axis} axis: the floor is level along it, though the rest pose stands along {standing}.",
@@ -105,10 +108,23 @@ def _upright(track: Track) -> str | None:
     return axis if max(share[1], share[2]) > SURE else None
 
 
-def _floor_unrest(heights: Array) -> float:
-    """How far the lowest landmark is from the level zero and how much it moves, in file units."""
+def _floor_unrest(track: Track, axis: int) -> float:
+    """How far the lowest landmark is from the level zero and how much it moves, in file units.
+
+    The level tells nothing where the pelvis is held at the origin, as some suits record it.
+    """
+    heights = track.landmarks[..., axis]
     finite = np.where(np.isfinite(heights), heights, np.inf).min(axis=1)
     lowest = finite[np.isfinite(finite)]
     if not len(lowest):
         return math.inf
-    return float(np.percentile(lowest, 90) - np.percentile(lowest, 10) + abs(np.median(lowest)))
+    level = 0.0 if _is_held(track) else abs(float(np.median(lowest)))
+    return float(np.percentile(lowest, 90) - np.percentile(lowest, 10)) + level
+
+
+def _is_held(track: Track) -> bool:
+    """Whether the pelvis stays so near the origin that no floor is at the level zero."""
+    pelvis, ankles = track.landmarks[:, LANDMARK["pelvis"]], [LANDMARK[f"{s}_ankle"] for s in SIDES]
+    legs = np.linalg.norm(track.landmarks[:, ankles].mean(axis=1) - pelvis, axis=-1)
+    away = np.linalg.norm(pelvis, axis=-1)
+    return bool(np.nanmedian(away) < HELD * np.nanmedian(legs)) if np.isfinite(away + legs).any() else False

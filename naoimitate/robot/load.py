@@ -38,7 +38,7 @@ def load_robot(name_or_path: str | Path, version: str | None = None) -> RobotMod
     folder = _folder(name_or_path)
     data = _read_data(folder)
     try:
-        urdf = (folder / "robot.urdf").read_text(encoding="utf-8")
+        urdf = _read_urdf(folder / "robot.urdf")
         version, changes = changes_of(data, version)
         mirror = Mirror(read_mechanism(urdf), data.get("mirror", {}))
         return build_model(version, apply_changes(urdf, changes, mirror), both_sides(data, mirror))
@@ -65,6 +65,13 @@ def _read_data(folder: Path) -> dict[str, Any]:
     require(data, SECTIONS, "robot.yaml")
     others = {path.stem: _read_yaml(path) for path in sorted(folder.glob("*.yaml")) if path.stem != "robot"}
     return others | data
+
+
+def _read_urdf(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise RobotModelError(f"{path} is no text (byte {error.start} is not UTF-8): correct it") from error
 
 
 def _read_yaml(path: Path) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ElementTree
 from typing import Any, NamedTuple
 
@@ -12,6 +13,8 @@ from naoimitate.core.errors import RobotModelError
 from naoimitate.robot.model import BASE, Array, Tree
 
 Element = ElementTree.Element
+NUMBERS = {"value", "ixx", "ixy", "ixz", "iyy", "iyz", "izz", "xyz", "rpy", "lower", "upper", "velocity", "effort"}
+"""Attributes that hold numbers."""
 
 
 class Frame(NamedTuple):
@@ -100,12 +103,32 @@ def _check_structure(robot: Element) -> None:
     for name in {*links, *names}:
         if (links + names).count(name) > 1:
             raise RobotModelError(f"robot.urdf gives the name {name!r} twice, to links or joints: rename one of them")
+    _check_numbers(robot)
     children = [_check_joint(joint, links) for joint in robot.findall("joint")]
     roots = [link for link in links if link not in children]
     if len(roots) != 1 or len(set(children)) != len(children):
         raise RobotModelError(
             f"robot.urdf is no tree with one base link (roots: {roots}): give each link one parent joint"
         )
+
+
+def _check_numbers(robot: Element) -> None:
+    """Masses, inertias, limits, axes and places: a number must be one, and finite."""
+    for owner in robot.findall("link") + robot.findall("joint"):
+        for element in owner.iter():
+            for key in NUMBERS & set(element.keys()):
+                if not all(_is_finite(word) for word in element.get(key, "").split()):
+                    raise RobotModelError(
+                        f"robot.urdf, {owner.tag} {owner.get('name')!r}: "
+                        f"<{element.tag} {key}={element.get(key)!r}> is no number, correct it"
+                    )
+
+
+def _is_finite(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False
 
 
 def _check_joint(joint: Element, links: list[str]) -> str:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from naoimitate.calib.subject import calibrate
-from naoimitate.core.errors import CalibrationError
-from naoimitate.core.frames import LANDMARK, LANDMARKS, Array, Motion
+from naoimitate.core.frames import LANDMARK, Array, Motion
+from naoimitate.motion.describe import describe
 from naoimitate.run.contact import intervals
 from naoimitate.run.figures import COLOURS, LEFT, MODE_NAMES, RIGHT, legend
 
@@ -30,17 +31,28 @@ BONES = (
 
 def describe_motion(motion: Motion) -> list[str]:
     """What is known about a motion, a line each."""
-    first, last = motion.time[0], motion.time[-1]
-    lines = [
-        f"{motion.name}: {len(motion)} frames from {first:.2f} to {last:.2f} s, {_rate(motion):.1f} Hz",
-        *(f"  {note}" for note in motion.notes),
-        f"  T-pose: {motion.tpose_note or 'none'}",
-        f"  person: {_person(motion)}",
-        f"  missing landmarks: {_missing(motion)}",
-        f"  feet: lowest {_lowest_foot(motion):+.3f} m over the floor",
-        f"  support: {_support(motion)}",
+    facts = describe(motion)
+    missing = [f"{name} ({100.0 * share:.0f} %)" for name, share in facts["missing"].items()]
+    support = [f"{MODE_NAMES[mode]} {100.0 * share:.1f} %" for mode, share in facts["support"].items()]
+    span = f"from {facts['start']:.2f} to {facts['end']:.2f} s"
+    return [
+        f"{facts['name']}: {facts['frames']} frames {span}, {facts['rate']:.1f} Hz",
+        *(f"  {note}" for note in facts["notes"]),
+        f"  T-pose: {facts['tpose'] or 'none'}",
+        f"  person: {_person(facts)}",
+        f"  missing landmarks: {', '.join(missing) or 'none'}",
+        f"  feet: lowest {facts['lowest_foot']:+.3f} m over the floor",
+        f"  support: {', '.join(support) or 'unknown'}",
     ]
-    return lines
+
+
+def _person(facts: dict[str, Any]) -> str:
+    measures = facts["person"]
+    if not measures:
+        return f"not measured: {facts['not_measured']}"
+    arms, legs = (" and ".join(f"{length:.2f}" for length in measures[limb]) for limb in ("arms", "legs"))
+    height, ankles = measures["stature"], measures["ankle_height"]
+    return f"height {height:.2f} m, arms {arms} m, legs {legs} m, ankles {ankles:.3f} m"
 
 
 def picture_motion(motion: Motion) -> Figure:
@@ -98,36 +110,3 @@ def _draw_modes(axes: Axes, motion: Motion) -> None:
 
 def _span(motion: Motion) -> tuple[float, float]:
     return float(motion.time[0]), float(max(motion.time[-1], motion.time[0] + 1e-3))
-
-
-def _rate(motion: Motion) -> float:
-    return (len(motion) - 1) / float(motion.time[-1] - motion.time[0]) if len(motion) > 1 else 0.0
-
-
-def _person(motion: Motion) -> str:
-    if motion.tpose is None:
-        return "not measured, because there is no T-pose; give its moment with --tpose-at"
-    try:
-        body = calibrate(motion.tpose).body
-    except CalibrationError as error:
-        return f"not measured: {error}"
-    limbs = f"arms {body.arm[0]:.2f} m, legs {body.leg[0]:.2f} m, ankles {body.ankle_height:.3f} m"
-    return f"height {body.stature:.2f} m, {limbs}"
-
-
-def _missing(motion: Motion) -> str:
-    missing = np.isnan(motion.landmarks).any(axis=2).mean(axis=0)
-    named = [f"{name} ({100.0 * share:.0f} %)" for name, share in zip(LANDMARKS, missing, strict=True) if share > 0.0]
-    return ", ".join(named) or "none"
-
-
-def _lowest_foot(motion: Motion) -> float:
-    rows = [LANDMARK[f"{side}_{part}"] for side in "lr" for part in ("ankle", "toe")]
-    return float(np.nanmin(motion.landmarks[:, rows, 2]))
-
-
-def _support(motion: Motion) -> str:
-    if motion.support is None:
-        return "unknown"
-    shares = [f"{name} {100.0 * float((motion.support == mode).mean()):.1f} %" for mode, name in MODE_NAMES.items()]
-    return ", ".join(shares)

@@ -45,15 +45,15 @@ def describe_robot(robot: RobotModel) -> list[str]:
 
 
 def picture_robot(robot: RobotModel) -> Figure:
-    """The robot in its main postures, from two sides."""
-    figure = Figure(figsize=(9.0, 7.0), layout="constrained")
-    grid = figure.subplots(len(VIEWS), len(DRAWN), squeeze=False)
+    """The robot in its main postures, from two sides, all to one scale."""
+    figure = Figure(figsize=(9.0, 6.0), layout="constrained")
+    grid = figure.subplots(len(VIEWS), len(DRAWN), squeeze=False, sharex=True, sharey=True)
     for column, name in enumerate(DRAWN):
         pose = standing_pose(robot, robot.postures[name])
         for row, (view, right) in enumerate(VIEWS):
             _draw(grid[row][column], robot, pose, right)
             grid[row][column].set_title(f"{name}, {view}", fontsize=10)
-    figure.suptitle(f"{robot.name} {robot.version}")
+    figure.suptitle(f"{robot.name} {robot.version}, lengths in m")
     return figure
 
 

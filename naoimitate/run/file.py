@@ -5,13 +5,15 @@ Readers ignore keys that they do not know, so a later program may add some.
 
 from __future__ import annotations
 
+import math
 import os
 import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from tokenize import TokenError
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -90,6 +92,11 @@ class Run:
         return float(self.time[-1] - self.time[0])
 
 
+LARGEST = 1 << 30
+"""Most that one array of a run may hold, bytes: a day of the largest, ``human_posture``, at 100 Hz."""
+DAMAGE = (ValueError, EOFError, KeyError, RuntimeError, TokenError, zlib.error, zipfile.BadZipFile)
+"""What reading a damaged archive raises; RuntimeError: zipfile, where flags ask for a password or another method."""
+
 KEYS = tuple(field.name for field in fields(Run))
 """Every key that a run file can hold, in the order of the fields."""
 
@@ -111,9 +118,10 @@ def save(run: Run, path: str | Path) -> None:
             np.savez_compressed(file, **arrays)
         os.chmod(name, 0o666 & ~_umask())
         os.replace(name, path)
-    except BaseException:
+    except OSError as error:
+        raise RunFileError(f"cannot write {path}: {error.strerror}; choose another folder with --out") from error
+    finally:
         Path(name).unlink(missing_ok=True)
-        raise
 
 
 def load_run(path: str | Path) -> Run:
@@ -134,14 +142,29 @@ def load_run(path: str | Path) -> Run:
 def _read(path: Path) -> dict[str, npt.NDArray[Any]]:
     """The known keys of an .npz file as they are."""
     try:
-        with path.open("rb") as raw, np.lib.npyio.NpzFile(raw, allow_pickle=False) as file:
-            return {key: file[key] for key in file.files if key in KEYS}
+        with path.open("rb") as raw:
+            _check_sizes(raw)
+            with np.lib.npyio.NpzFile(raw, allow_pickle=False) as file:
+                return {key: file[key] for key in file.files if key in KEYS}
     except FileNotFoundError as error:
         raise RunFileError(f"{path}: no such file; make one with 'naoimitate imitate MOTION --out {path}'") from error
     except OSError as error:
         raise RunFileError(f"{path}: cannot be read ({error.strerror})") from error
-    except (ValueError, EOFError, KeyError, zlib.error, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise RunFileError(f"{path}: not a whole .npz run file; make it again with 'naoimitate imitate'") from error
+
+
+def _check_sizes(raw: BinaryIO) -> None:
+    """Raise ValueError for arrays that no run can fill: small files can claim to hold more than any memory."""
+    with zipfile.ZipFile(raw) as archive:
+        for member in {f"{key}.npy" for key in KEYS} & set(archive.namelist()):
+            with archive.open(member) as stream:
+                old = np.lib.format.read_magic(stream) == (1, 0)
+                header = np.lib.format.read_array_header_1_0 if old else np.lib.format.read_array_header_2_0
+                shape, _, dtype = header(stream)
+            size = math.prod(shape) * dtype.itemsize
+            if size > min(archive.getinfo(member).file_size, LARGEST):
+                raise ValueError(f"{member} claims to hold {size} bytes")
 
 
 def _umask() -> int:

@@ -14,14 +14,13 @@ from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import Motion, RobotCommand
 from naoimitate.human.support import annotate
 from naoimitate.imitator import Imitator
+from naoimitate.motion.stretch import FRAMEWISE, stretch
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.file import Run
 from naoimitate.run.pace import AutoPace, ConstantPace
 from naoimitate.run.provenance import provenance
 from naoimitate.settings import Settings
 
-SAMPLED = ("landmarks", "orientations", "com", "contacts", "support", "hand_opening")
-"""What a motion has a value of in every frame, times apart."""
 LONGEST = 40.0
 """A run is ended after this many times the length of the clip, plus a minute: nothing waits for ever."""
 
@@ -50,7 +49,7 @@ def imitate(
     Raises MotionFormatError for a motion without a T-pose or an empty stretch, CalibrationError for an unusable T-pose.
     """
     settings = settings or Settings()
-    motion = annotate(_stretch(motion, start, end))
+    motion = annotate(stretch(motion, start, end))
     seen = motion if sample is None else resample(motion, sample)
     if subject is None:
         if motion.tpose is None:
@@ -97,22 +96,8 @@ def resample(motion: Motion, rate: float) -> Motion:
         values = [getattr(f, name) for f in frames]
         return None if values[0] is None else np.array(values)
 
-    changed: dict[str, Any] = {name: stack(name) for name in SAMPLED}
+    changed: dict[str, Any] = {name: stack(name) for name in FRAMEWISE}
     return replace(motion, time=times, **changed)
-
-
-def _stretch(motion: Motion, start: float | None, end: float | None) -> Motion:
-    keep = (motion.time >= (-np.inf if start is None else start)) & (motion.time <= (np.inf if end is None else end))
-    if not keep.any():
-        raise MotionFormatError(
-            f"no frame between --start and --end: {motion.name} lasts from "
-            f"{motion.time[0]:.2f} to {motion.time[-1]:.2f} s"
-        )
-    if keep.all():
-        return motion
-    whole = {name: getattr(motion, name) for name in ("time", *SAMPLED)}
-    kept: dict[str, Any] = {name: None if values is None else values[keep] for name, values in whole.items()}
-    return replace(motion, **kept)
 
 
 def _play(

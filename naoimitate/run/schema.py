@@ -20,6 +20,11 @@ RATE_TOLERANCE = 0.01
 QUATERNION_TOLERANCE = 1e-6
 """Largest deviation of a quaternion's norm from 1."""
 
+LARGEST = 1e9
+"""Bound on every number, in its unit: beyond it, damage; it would overflow in what is computed from it."""
+MIN_STEP = 1e-6
+"""Least step of the clock, s: below it, damage; speeds could not be told."""
+
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 
@@ -111,11 +116,15 @@ def _check_shapes(arrays: Arrays) -> None:
             known = sizes.setdefault(want, size) if isinstance(want, str) else want
             if size != known:
                 raise RunFileError(f"key '{name}' has shape {value.shape}, expected {want} = {known}")
-        if key.kind is float and not key.nan and not np.all(np.isfinite(value)):
-            raise RunFileError(f"key '{name}' holds NaN or infinity")
+        if key.kind is float and not _plausible(value, key.nan):
+            raise RunFileError(f"key '{name}' holds infinity, {'' if key.nan else 'NaN '}or numbers beyond {LARGEST:g}")
     for letter in ("T", "J"):
         if sizes[letter] < 1:
             raise RunFileError(f"key '{'time' if letter == 'T' else 'joint_names'}' is empty")
+
+
+def _plausible(value: npt.NDArray[Any], nan: bool) -> bool:
+    return bool(np.all((np.abs(value) <= LARGEST) | (nan & np.isnan(value))))
 
 
 def _unit(name: str) -> Callable[[Arrays], bool]:
@@ -139,7 +148,7 @@ def _known_human(a: Arrays) -> bool:
 def _is_json_object(a: Arrays) -> bool:
     try:
         return isinstance(json.loads(str(a["provenance"])), dict)
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
 
 
@@ -154,7 +163,7 @@ def _not_falling(value: npt.NDArray[Any]) -> bool:
 
 
 _RULES: tuple[tuple[str, Callable[[Arrays], bool], str], ...] = (
-    ("time", lambda a: bool(np.all(np.diff(a["time"]) > 0.0)), "does not increase strictly"),
+    ("time", lambda a: bool(np.all(np.diff(a["time"]) >= MIN_STEP)), "does not increase strictly"),
     ("time", _fast_enough, f"has fewer than {MIN_RATE:.0f} frames a second"),
     ("human_time", lambda a: _not_falling(a["human_time"]), "decreases"),
     ("human_posture", _known_human, "must be NaN exactly where human_time is"),

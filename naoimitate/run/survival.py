@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from naoimitate.core.geometry import matrix_from_quat
+from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.run.file import Run
 from naoimitate.run.measure import Bar, Measure
 
-MAX_TILT = np.radians(45.0)
-"""Largest angle of the torso's up-axis from its planned direction, rad."""
-MIN_HEIGHT = 0.6
-"""Smallest height of the torso as a fraction of the planned one."""
 MS = 1000.0
 
 
@@ -28,10 +24,8 @@ def fell(run: Run) -> bool | None:
 def _toppled(run: Run) -> bool:
     if run.sim_base_pos is None or run.sim_base_quat is None:
         return False
-    low = run.sim_base_pos[:, 2] < MIN_HEIGHT * run.base_pos[:, 2]
-    up = [np.array([matrix_from_quat(quat)[:, 2] for quat in quats]) for quats in (run.base_quat, run.sim_base_quat)]
-    tilted = np.sum(up[0] * up[1], axis=1) < np.cos(MAX_TILT)
-    return bool(np.any(low | tilted))
+    height_ratio = run.sim_base_pos[:, 2] / run.base_pos[:, 2]
+    return bool(has_tipped(tilt(run.base_quat, run.sim_base_quat), height_ratio).any())
 
 
 def survival(run: Run) -> list[Measure]:

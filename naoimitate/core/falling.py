@@ -1,4 +1,4 @@
-"""When a robot on servos counts as fallen: the measure ``survival`` as pure functions of plan and simulation."""
+"""When a robot on servos counts as fallen: the measure ``survival`` as pure functions of plan and real motion."""
 
 from __future__ import annotations
 
@@ -23,16 +23,6 @@ def up_axis(quat: Array) -> Array:
     """Up-axis (..., 3) of a torso in the world: third column of the rotation of quat (..., 4) (w, x, y, z)."""
     w, x, y, z = np.moveaxis(np.asarray(quat, dtype=float), -1, 0)
     return np.stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)], axis=-1)
-
-
-def roll_pitch(quat: Array) -> Array:
-    """Roll and pitch (2,) rad of a torso, as an inertial board gives them: from the direction of gravity alone.
-
-    R = Rz(yaw) Ry(pitch) Rx(roll); the last row of R is (-sin p, cos p sin r, cos p cos r).
-    """
-    w, x, y, z = quat
-    down = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    return np.array([math.atan2(down[1], down[2]), math.asin(min(max(-down[0], -1.0), 1.0))])
 
 
 def tilt(planned_quat: Array, quat: Array) -> Array:
