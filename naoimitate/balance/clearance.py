@@ -50,8 +50,9 @@ class Clearance:
         self._d, self._normal = np.empty(count), np.empty((count, 3))
         self._a, self._b = np.empty((count, 3)), np.empty((count, 3))
         self._lowest = np.empty((len(robot.shapes), 3))
-        feet = {robot.points[f"{s}_sole"].joint for s in "lr"}
+        feet = [robot.points[f"{s}_sole"].joint for s in "lr"]
         self._not_foot = np.array([shape.joint not in feet for shape in robot.shapes])
+        self._not_stance = np.array([[shape.joint != foot for shape in robot.shapes] for foot in feet])
 
     def look(self, pose: Pose) -> None:
         """Measure a pose, if it is another one than before."""
@@ -91,11 +92,15 @@ class Clearance:
             self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._arm_numbers,
         )  # fmt: skip
 
-    def leg_rows(self, pose: Pose, legs: Legs, side: int) -> tuple[Array, Array]:
-        """Rows (C, n) and bounds (C,) m for the legs, with the base hung on sole ``side``."""
+    def leg_rows(self, pose: Pose, legs: Legs, side: int, free: bool = False) -> tuple[Array, Array]:
+        """Rows (C, n) and bounds (C,) m for the legs, with the base hung on sole ``side``.
+
+        free: the other foot swings freely, and must not touch the floor with any part.
+        """
+        above = self._not_stance[side] if free else self._not_foot
         return _leg_rows(
             self._tree, legs, side, self._pairs, self._shapes, self._d, self._a, self._b, self._normal, self._lowest,
-            self._not_foot, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._numbers,
+            above, pose.link_pos, pose.link_rot, pose.base_pos, pose.base_rot, *self._numbers,
         )  # fmt: skip
 
     @property

@@ -116,7 +116,7 @@ class Planted:
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
-        rows = self._clearance.leg_rows(moved, self._legs, stride.side)
+        rows = self._clearance.leg_rows(moved, self._legs, stride.side, plan.kind != POSE)
         about, low, high = self._sway.bounds(pose, moved, plan.sway, reach.dt)
         goal = goal._replace(about=about, sway_low=low, sway_high=high)
         ways = ((goal, rows[1]), (goal._replace(overload=np.inf), np.minimum(rows[1], 0.0)))

@@ -21,9 +21,8 @@ class Pose:
     """A pose and what is derived from it.
 
     q: (J,) rad. base_rot: (3, 3), base_pos: (3,) m. com: (3,) m. sole_pos: (2, 3) m, sole_rot: (2, 3, 3). In the world.
-    soles_in_base: (2, 3) m, the soles' places in the torso frame.
-    link_pos, link_rot: link frames in the base frame, as ``kernel.forward`` fills them. centres: (J + 1, 3) m, of mass of
-    the links, in the world.
+    soles_in_base: (2, 3) m, the soles' places in the torso frame. link_pos, link_rot: link frames in the base frame, as
+    ``kernel.forward`` fills them. centres: (J + 1, 3) m, of mass of the links, in the world.
     """
 
     q: Array
