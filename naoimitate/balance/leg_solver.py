@@ -41,7 +41,7 @@ Array = npt.NDArray[np.float64]
 
 SLACKS = 3
 """Of load, smoothness and sway."""
-CONVERGED = 1e-6
+CONVERGED = 5e-7
 """[rad] of a step, below which the next one changes nothing."""
 CLOSED = 1e-8
 """Sum of m and rad of the other sole's error, below which the loop is closed."""
