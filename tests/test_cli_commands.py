@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from synthetic import standing
 
 from naoimitate.cli import run
@@ -104,3 +105,13 @@ def test_a_calibrated_subject_serves_a_later_run(here: Path, capsys: pytest.Capt
     assert "height 1.75 m" in capsys.readouterr().out
     assert run(["imitate", "builtin:wave", "--end", "0.5", "--subject", "subject.yaml", "--out", "run.npz"]) == 0
     assert len(json.loads(load_run("run.npz").provenance)["subject_sha256"]) == 64
+
+
+def test_robots_computes_a_landing_set_as_a_part_of_a_robots_file(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = {"directions_deg": [0.0, 120.0, 240.0], "yaws": [-0.2, 0.2], "reach": [[0.1, 0.2, 0.1], [0.1, 0.2, 0.1]]}
+    monkeypatch.setattr("naoimitate.balance.landing_tool.compute_landing_set", lambda robot, progress: data)
+    assert run(["robots", "--landing-set", "nao"]) == 0
+    assert yaml.safe_load(capsys.readouterr().out) == {"landing": data}
+    assert run(["robots", "--landing-set", "nobody"]) == 2

@@ -41,9 +41,9 @@ def wave(nao: RobotModel) -> Run:
 
 def test_a_run_covers_the_clip_at_the_persons_pace(wave: Run) -> None:
     motion = builtin_motion("wave")
-    assert wave.human_time[0] == 0.0 and wave.human_time[-1] == pytest.approx(motion.duration)
+    assert wave.human_time[0] == 0.0 and motion.duration - 0.02 < wave.human_time[-1] <= motion.duration
     assert np.diff(wave.time) == pytest.approx(0.02)
-    assert wave.human_time[:-1] - wave.time[:-1] == pytest.approx(0.0, abs=1e-9)
+    assert wave.human_time - wave.time == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_run_can_be_written_and_read(wave: Run, tmp_path: Path) -> None:
@@ -119,8 +119,8 @@ def test_any_frame_rate_of_the_file_runs(nao: RobotModel, rate: float) -> None:
 
 def test_a_camera_of_30_frames_sees_30_frames() -> None:
     seen = resample(builtin_motion("wave"), 30.0)
-    assert np.diff(seen.time) == pytest.approx(1.0 / 30.0)
-    assert seen.time[-1] >= builtin_motion("wave").duration - 1.0 / 30.0
+    assert np.diff(seen.time[:-1]) == pytest.approx(1.0 / 30.0)
+    assert seen.time[-1] == builtin_motion("wave").duration
     assert seen.support is not None and len(seen.support) == len(seen.time)
 
 

@@ -82,7 +82,7 @@ class AutoPace:
         self._index = max(i for i, p in enumerate(self._phases) if p.start <= start or i == 0)
         self._rate, self._waited = 0.0, 0.0
         self._shift = _shift_times(law)
-        self.time = start
+        self.time, self._end = start, motion.duration
 
     def next(self, dt: float, mode: Mode, offset: float, lag: float, may_lift: bool = True) -> Moment:
         """Advance by at most dt s, given the robot's support mode, offset, lag in m, and whether it may lift a foot."""
@@ -108,7 +108,7 @@ class AutoPace:
         wanted = min(wanted, math.sqrt(2.0 * self._s.change * max(gap, 0.0)))
         self._rate += min(max(wanted - self._rate, -4.0 * self._s.change * dt), self._s.change * dt)
         self._rate = min(max(self._rate, 0.0), 1.0)
-        step = min(self._rate * dt, max(gap - 1e-6, 0.0))
+        step = min(self._rate * dt, max(gap - 1e-6, 0.0), max(self._end - self.time, 0.0))
         self.time += step
         while self._index + 1 < len(self._phases) and self.time >= self._phases[self._index].end:
             self._index += 1

@@ -24,6 +24,9 @@ from naoimitate.settings import Settings
 LONGEST = 40.0
 """A run is ended after this many times the length of the clip, plus a minute: nothing waits for ever."""
 
+WARM_UP = 100
+"""Steps in which a robot that can lift a foot has lifted it, or set it down."""
+
 
 def imitate(
     motion: Motion,
@@ -81,15 +84,18 @@ def imitate(
 
 
 def _warm_up(imitator: Imitator, motion: Motion) -> None:
-    """Step through the first frame, so that compiling or loading the kernel is not counted as a step of the run."""
+    """One step on the spot in the first posture: compiling or loading the kernel is no part of the run's own steps."""
     first = motion.at(float(motion.time[0]))
-    for support in ("D", "D", "L"):
-        imitator.step(first, 0.01, support=support)
+    for support in ("L", "D"):
+        for _ in range(WARM_UP):
+            imitator.step(first, imitator.settings.limits.max_dt, support=support)
+            if imitator.mode.stance == support:
+                break
 
 
 def resample(motion: Motion, rate: float) -> Motion:
-    """The motion as a camera of ``rate`` Hz sees it."""
-    times = np.arange(motion.time[0], motion.duration + 0.5 / rate, 1.0 / rate)
+    """The motion as a camera of ``rate`` Hz sees it, and its last frame."""
+    times = np.append(np.arange(motion.time[0], motion.duration - 1e-6, 1.0 / rate), motion.duration)
     frames = [motion.at(float(t)) for t in times]
 
     def stack(name: str) -> np.ndarray | None:
@@ -113,10 +119,12 @@ def _play(
     longest = 60.0 + LONGEST * (last - first)
     while law.time < last - 1e-9 and commands[-1].time < longest:
         moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag, imitator.may_lift)
+        if moment.time > last + 1e-9:
+            break
         begin = clock.perf_counter()
         commands.append(imitator.step(motion.at(moment.time), dt, support=moment.support, ahead=moment.ahead))
         step_times.append(clock.perf_counter() - begin)
-        moments.append(min(moment.time, last))
+        moments.append(moment.time)
         if progress is not None:
             progress((moments[-1] - first) / (last - first))
     return commands, moments, step_times
