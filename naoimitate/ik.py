@@ -56,11 +56,21 @@ def bounded_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Arr
     With H = J^T W J + damping^2 E and g = J^T W e this is the damped least squares step that keeps joint, speed and
     distance bounds exactly, instead of cutting a step afterwards, which would move planted feet apart.
 
-    Dual active-set method of Goldfarb and Idnani 1983: starts from the unconstrained minimum, adds the most violated
-    row, drops rows whose multiplier turns negative. H: (n, n) positive definite; C: (k, n); b: (k,); x: (n,), written.
+    H: (n, n) positive definite; C: (k, n); b: (k,); x: (n,), written.
     Returns ``SOLVED`` or ``INFEASIBLE`` (x is then the last iterate and must not be used).
     """
+    return priced_step(H, g, C, b, equalities, x, np.empty(C.shape[0]))
+
+
+@njit(cache=True)
+def priced_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Array, price: Array) -> int:
+    """``bounded_step`` that also tells what each row costs: price (k,), written, the rows' Lagrange multipliers.
+
+    Dual active-set method of Goldfarb and Idnani 1983: starts from the unconstrained minimum, adds the most violated
+    row, drops rows whose multiplier turns negative.
+    """
     n, k = H.shape[0], C.shape[0]
+    price[:] = 0.0
     L = np.linalg.cholesky(H)
     J = np.ascontiguousarray(np.linalg.inv(L).T)
     x[:] = J @ (J.T @ g)
@@ -73,6 +83,8 @@ def bounded_step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Arr
     for _ in range(_MAX_CHANGES):
         p = _most_violated(C, b, equalities, x, is_active | is_redundant)
         if p < 0:
+            for i in range(size):
+                price[active[i]] = u[i]
             return SOLVED
         s = _row_value(C, p, x) - b[p]
         sign[p] = -1.0 if p < equalities and s > 0.0 else 1.0

@@ -34,15 +34,15 @@ from naoimitate.balance.leg_rows import (
 from naoimitate.balance.legs import POSE, REACH, LegGoal, Legs, LegWeights, Stance
 from naoimitate.balance.retarget import Reach
 from naoimitate.core.geometry import rotation_vector
-from naoimitate.ik import SOLVED, bounded_step
+from naoimitate.ik import SOLVED, bounded_step, priced_step
 from naoimitate.robot.model import Tree
 
 Array = npt.NDArray[np.float64]
 
 SLACKS = 3
 """Of load, smoothness and sway."""
-CONVERGED = 5e-7
-"""[rad] of a step, below which the next one changes nothing."""
+CONVERGED = 3e-4
+"""[rad] of a step, below which the next one would be as small as its square."""
 CLOSED = 1e-8
 """Sum of m and rad of the other sole's error, below which the loop is closed."""
 
@@ -94,7 +94,7 @@ def solve_legs(
         row = joint_rows(legs, q, start, reach, C, b, row)
         row = table_rows(legs, q, C, b, row)
         row = extra_rows(rows, bounds, moved, C, b, row)
-        if bounded_step(H, g, C[:row], b[:row], 6 if stance.kind == POSE else 0, x) != SOLVED:
+        if _step(H, g, C[:row], b[:row], 6 if stance.kind == POSE else 0, x) != SOLVED:
             break
         done += 1
         damping *= weights.damping_growth
@@ -103,6 +103,25 @@ def solve_legs(
             if legs.variable[j] >= 0:
                 q[j] += x[legs.variable[j]]
     return done, closure, com_error
+
+
+@njit(cache=True)
+def _step(H: Array, g: Array, C: Array, b: Array, equalities: int, x: Array) -> int:
+    """The bounded step x (n + SLACKS,), first without slacks: most often nothing has to give.
+
+    Where no group of soft rows costs more than its slack would, the step without slacks is the step with them.
+    """
+    n = H.shape[0] - SLACKS
+    price = np.empty(C.shape[0])
+    hard = (np.ascontiguousarray(H[:n, :n]), g[:n].copy(), np.ascontiguousarray(C[:, :n]))
+    if priced_step(*hard, b, equalities, x[:n], price) == SOLVED:
+        x[n:] = 0.0
+        fair = True
+        for k in range(n, n + SLACKS):
+            fair = fair and np.dot(np.ascontiguousarray(C[:, k]), price) <= -g[k]
+        if fair:
+            return SOLVED
+    return bounded_step(H, g, C, b, equalities, x)
 
 
 @njit(cache=True)
