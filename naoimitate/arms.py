@@ -6,12 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 
 from naoimitate.balance.clearance import Clearance
 from naoimitate.balance.legs import table_bounds
 from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.pose import Pose
 from naoimitate.balance.retarget import Reach
+from naoimitate.branch import Branch
 from naoimitate.core.geometry import yaw_matrix
 from naoimitate.human.observer import Observation
 from naoimitate.ik import SOLVED, bounded_step
@@ -28,18 +30,8 @@ _PALM = (yaw_matrix(np.pi / 2), yaw_matrix(-np.pi / 2))
 """Torso from hand link in a T-pose: the links point along x, the human's arms along +-y."""
 
 
-BRANCH_GAIN = 0.006
-"""[m] by which another arm posture must fit better to be worth a change."""
-BRANCH_PERIOD = 12
-"""Frames between two looks for a better arm posture."""
-BRANCH_SPEED = 0.6
-"""Share of the joints' speed limit at which an arm changes its posture."""
-BRANCH_BRAKING = 20.0
-"""[rad/s^2] with which it comes to rest there."""
 AT_END, AT_BOUND = 0.02, 1e-6
 """[rad] from a joint's end, and from what a frame allows, at which it counts as there."""
-BRANCH_NEAR = 0.1
-"""[rad] from the other posture at which the hand is followed again."""
 
 SETTLE_STEP = 0.1
 """[rad] of each joint in one step of ``settle``."""
@@ -54,22 +46,19 @@ class Arms:
         self._paper = paper
         self._robot, self._weights, self._orientation = robot, weights, orientation
         self._limbs = [build_limb(robot, f"{s}_arm", reserve) for s in "lr"]
-        self._no_rows = [(np.zeros((0, len(limb.joints))), np.zeros(0)) for limb in self._limbs]
+        self._branches = [Branch(robot, limb) for limb in self._limbs]
         self._reserve = reserve
-        self._thorough = weights._replace(iterations=30.0)
-        self._transit = weights._replace(tip=0.0, rest=0.1, iterations=1.0)
-        self._anywhere = (robot.lower, robot.upper)
-        self._seeds = [
-            np.unique([posture[limb.joints] for posture in robot.postures.values()], axis=0) for limb in self._limbs
-        ]
+        self._to_goal = weights._replace(bend=0.0)
         self.reset()
         self._head = robot.chains["head"]
         self._table = next((t for t in robot.tables if t.y in self._head), None)
 
     def reset(self) -> None:
         """Forget the past."""
-        self._branch: list[Array | None] = [None, None]
-        self._frames = 0
+        for branch in self._branches:
+            branch.reset()
+        self._errors = [0.0, 0.0]
+        self._hurried = [False, False]
 
     def hands(self, pose: Pose) -> Array:
         """Hands from the shoulders in the torso frame, (2, 3) m."""
@@ -102,39 +91,51 @@ class Arms:
     ) -> tuple[Array, int]:
         """Joint angles (J,) with both arms moved towards targets (2, 3) m, and the iterations it took."""
         q, iterations = pose.q.copy(), 0
-        self._frames += 1
-        for side, limb in enumerate(self._limbs):
-            task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
+        for side, (limb, branch) in enumerate(zip(self._limbs, self._branches, strict=True)):
             rows = clearance.limb_rows(pose, limb.joints)
             if self._paper is not None:
                 iterations += self._as_published(self._paper, limb, targets[side], q, reach.low, reach.high, *rows)
                 continue
-            if self._branch[side] is not None:
-                iterations += self._change_branch(side, q, task, reach, rows)
-                continue
-            done, error, misfit = self._follow(limb, task, q, reach, rows)
+            task = (targets[side], seen.body.elbows[side], *self._tip(pose, seen, side))
+            branch.look(q, targets[side], reach.dt, self._errors[side], self._hurried[side])
+            if branch.goal is None:
+                done, error = self._follow(limb, self._weights, task, q, branch.bounds(q, reach), rows)
+            else:
+                done, error = self._change(limb, branch, task, q, reach, rows)
+            self._errors[side], self._hurried[side] = error, self._at_speed(side, q, reach)
             iterations += done
-            if error > BRANCH_GAIN and self._frames % BRANCH_PERIOD == side:
-                iterations += self._look_for_branch(side, q, task, misfit)
         return q, iterations
 
     def _follow(
-        self, limb: Limb, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
-    ) -> tuple[int, float, float]:
-        """One frame of a limb, smooth where the body does not forbid it: (iterations, tip error m, misfit m)."""
-        found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
+        self, limb: Limb, weights: LimbWeights, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
+    ) -> tuple[int, float]:
+        """One frame of a limb, smooth where the body does not forbid it: (iterations, tip error m)."""
+        found = solve_limb(self._robot.tree, limb, weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
         if found[0] == 0:
-            found = solve_limb(self._robot.tree, limb, self._weights, *task, q, reach.low, reach.high, *rows)
+            found = solve_limb(self._robot.tree, limb, weights, *task, q, reach.low, reach.high, *rows)
+        return found
+
+    def _change(
+        self, limb: Limb, branch: Branch, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
+    ) -> tuple[int, float]:
+        """One frame of a limb on its way to another posture, the hand as near to its target as the way allows."""
+        goal, before = branch.goal, q[limb.joints]
+        assert goal is not None
+        if reach.dt == 0.0:
+            q[limb.joints], branch.goal = goal, None
+            return 1, 0.0
+        free = (task[0], np.zeros(3), task[2], 0)
+        found = self._follow(limb._replace(rest=goal), self._to_goal, free, q, branch.bounds(q, reach), rows)
+        branch.moved(before, q[limb.joints])
         return found
 
     def hurried(self, side: int, q: Array, reach: Reach) -> bool:
         """Whether an arm has moved as fast as it may in this frame, joints at their ends apart."""
-        if self._branch[side] is not None:
-            return True
+        return self._branches[side].goal is not None or self._at_speed(side, q, reach)
+
+    def _at_speed(self, side: int, q: Array, reach: Reach) -> bool:
         limb = self._limbs[side]
-        angles, low, high = q[limb.joints], reach.smooth_low[limb.joints], reach.smooth_high[limb.joints]
-        inside = (angles - limb.lower > AT_END) & (limb.upper - angles > AT_END)
-        return bool((inside & ((angles - low < AT_BOUND) | (high - angles < AT_BOUND))).any())
+        return _at_bound(q, reach.smooth_low, reach.smooth_high, limb.joints, limb.lower, limb.upper)
 
     def _as_published(
         self, ik: PaperIk, limb: Limb, target: Array, q: Array, low: Array, high: Array, rows: Array, bounds: Array
@@ -149,42 +150,6 @@ class Arms:
         solved = bounded_step(unit, wish, *within, 0, step) == SOLVED
         q[limb.joints] = before + (step if solved else 0.0)
         return ik.arm_iterations
-
-    def _look_for_branch(self, side: int, q: Array, task: Task, misfit: float) -> int:
-        """Start afresh from other postures; keep the best arm posture that fits clearly better."""
-        limb, iterations = self._limbs[side], 0
-        for seed in self._seeds[side]:
-            trial = q.copy()
-            trial[limb.joints] = seed
-            done, _, found = solve_limb(
-                self._robot.tree, limb, self._thorough, *task, trial, *self._anywhere, *self._no_rows[side]
-            )
-            iterations += done
-            if found < misfit - BRANCH_GAIN:
-                misfit, self._branch[side] = found, trial[limb.joints]
-        return iterations
-
-    def _change_branch(self, side: int, q: Array, task: Task, reach: Reach, rows: tuple[Array, Array]) -> int:
-        """Move an arm of q through joint space towards its other posture, until that is near."""
-        limb, goal = self._limbs[side], q.copy()
-        goal[limb.joints] = self._branch[side]
-        done, _, _ = solve_limb(
-            self._robot.tree, limb, self._weights, *task, goal, *self._anywhere, *self._no_rows[side]
-        )
-        if reach.dt == 0.0:
-            q[limb.joints], self._branch[side] = goal[limb.joints], None
-            return done
-        way = limb._replace(rest=goal[limb.joints])
-        before = q[limb.joints]
-        most = np.minimum(BRANCH_SPEED * (reach.high - q), np.sqrt(2.0 * BRANCH_BRAKING * np.abs(goal - q)) * reach.dt)
-        slow_low = np.clip(q - most, reach.smooth_low, reach.smooth_high)
-        slow_high = np.clip(q + most, reach.smooth_low, reach.smooth_high)
-        free = (task[0], np.zeros(3), task[2], 0)
-        more, _, _ = solve_limb(self._robot.tree, way, self._transit, *free, q, slow_low, slow_high, *rows)
-        near = np.abs(q[limb.joints] - way.rest).max() < BRANCH_NEAR
-        stuck = np.abs(q[limb.joints] - before).max() < 1e-4
-        self._branch[side] = None if near or stuck else way.rest
-        return done + more
 
     def _tip(self, pose: Pose, seen: Observation, side: int) -> tuple[Array, int]:
         """Orientation asked of a hand in the base frame, and how many of its rows count."""
@@ -203,3 +168,14 @@ class Arms:
                 table_low, _, table_high, _ = table_bounds(self._table.rows, q[self._table.x])
                 lower, upper = max(lower, table_low + self._reserve), min(upper, table_high - self._reserve)
             q[joint] = min(max(min(max(angle, lower), upper), near), far)
+
+
+@njit(cache=True)
+def _at_bound(q: Array, low: Array, high: Array, joints: npt.NDArray[np.int64], lower: Array, upper: Array) -> bool:
+    """Whether a joint that is not at its end is at what the frame allows; q, low, high: (J,) rad."""
+    for i in range(joints.shape[0]):
+        j = joints[i]
+        inside = q[j] - lower[i] > AT_END and upper[i] - q[j] > AT_END
+        if inside and (q[j] - low[j] < AT_BOUND or high[j] - q[j] < AT_BOUND):
+            return True
+    return False

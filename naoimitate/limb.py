@@ -21,6 +21,15 @@ from naoimitate.robot.model import RobotModel, Tree
 Array = npt.NDArray[np.float64]
 
 
+RETURN = 0.6
+"""Share of a frame's room that is taken from a joint outside its range: it comes back, and bounds never contradict."""
+CAUTION = 100.0
+"""By which the second priority is damped, per error and upper length: a target out of reach is nearest in one posture,
+though the Jacobian does not see the way out of it; what leaves it comes back in the next step."""
+SEEN = 1e-6
+"""Share of a row of the Jacobian that must be new for it to count as independent of the others."""
+
+
 class Limb(NamedTuple):
     """Flat description of an arm or a leg.
 
@@ -42,23 +51,23 @@ class Limb(NamedTuple):
 
 
 class LimbWeights(NamedTuple):
-    """Settings of ``solve_limb``; weights multiply errors in m (or m/rad)."""
+    """Settings of ``solve_limb``: of its second priority the weights, which multiply errors in m (or m/rad)."""
 
-    tip: float = 1.0
-    """Of the hand; 0 while the arm changes its branch in joint space."""
     bend: float = 0.3
     """Of the elbow's place on the human's upper-arm direction."""
     orientation: float = 0.1
     """[m/rad] of the tip's orientation, where one is asked for."""
     rest: float = 0.01
-    """[m/rad] towards the rest posture: without it a joint at a singularity runs to its stop for a millimetre."""
-    null_damping: float = 0.001
-    """[m/rad] below which a direction counts as one that the tip leaves free: elbow, orientation and rest act there."""
-    damping: float = 0.004
+    """[m/rad] towards the rest posture, where the elbow does not matter."""
+    damping: float = 0.02
     """[m/rad]. Its square grows by error times upper arm: as much as a stretched limb's way curves, or it would swing
     about in front of a target that it cannot reach (the error's square alone, Sugihara 2011, is too little)."""
+    rest_damping: float = 0.004
+    """[m/rad] of the second priority, where the target is reached."""
     tolerance: float = 1e-5
     """[m] of the tip's error below which the iteration stops."""
+    still: float = 1e-5
+    """[rad] below which a step ends the iteration."""
     iterations: float = 6.0
 
 
@@ -127,94 +136,166 @@ def solve_limb(
     q_high: Array,
     rows: Array,
     bounds: Array,
-) -> tuple[int, float, float]:
+) -> tuple[int, float]:
     """Move one limb of q (J,) rad towards its target, never past a bound.
+
+    Two priorities, both with every bound inside: the tip's damped least squares step; then, among the steps that move
+    the tip by the same amount, the one that serves elbow, orientation and rest best (Kanoun, Lamiraux and Wieber 2011,
+    inequality-constrained tasks in a hierarchy). So a joint at its end costs the elbow, never the hand.
 
     target: (3,) m, tip minus root in the base frame. bend: (3,) unit vector root to elbow, zero for none.
     tip_rotation: (3, 3) base from tip; orientation_rows: 0 free, 2 only its z axis (upright), 3 all.
     q_low, q_high: (J,) rad of this frame. rows (C, n), bounds (C,): ``rows (x - x0) >= bounds`` (collisions).
-    Returns (iterations, tip error in m, misfit in m: root of the whole weighted cost), the latter two before the last
-    step. Where no step is feasible q is unchanged.
+    Returns (iterations, tip error in m before the last step). Where no step is feasible q is unchanged.
     """
     n, count = limb.joints.shape[0], q.shape[0]
     pos, rot = np.empty((count + 1, 3)), np.empty((count + 1, 3, 3))
-    J = np.empty((3, count))
+    J, Jn = np.empty((3, count)), np.empty((3, n))
     angles, weights, x, moved = np.empty(n), np.ones(n), np.zeros(n), np.zeros(n)
     C, b = np.zeros((2 * n + rows.shape[0], n)), np.empty(2 * n + rows.shape[0])
-    wanted_bend = limb.root + limb.upper_length * bend
-    bend_weight = settings.bend * np.sqrt(bend[0] ** 2 + bend[1] ** 2 + bend[2] ** 2)
-    length, misfit, done = 0.0, 0.0, 0
-    limit = int(settings.iterations)
-    for iteration in range(limit + 1):
+    length, done = 0.0, 0
+    for _ in range(int(settings.iterations)):
         forward(tree, q, pos, rot)
         row = limb.tip_joint + 1
         tip = pos[row] + rot[row] @ limb.tip
         error = limb.root + target - tip
         length = float(np.sqrt(error[0] ** 2 + error[1] ** 2 + error[2] ** 2))
-        elbow = pos[limb.bend_joint + 1] + rot[limb.bend_joint + 1] @ limb.bend
-        misfit = (settings.tip * length) ** 2 + bend_weight**2 * np.sum((wanted_bend - elbow) ** 2)
-        for i in range(n):
-            misfit += (settings.rest * (q[limb.joints[i]] - limb.rest[i])) ** 2
-        if iteration == limit or (iteration > 0 and np.abs(x).max() < 1e-5):
+        if done > 0 and (length < settings.tolerance or np.abs(x).max() < settings.still):
             break
-        H, g = np.zeros((n, n)), np.zeros(n)
-        for i in range(n):
-            H[i, i] = settings.rest**2
-            g[i] = settings.rest**2 * (limb.rest[i] - q[limb.joints[i]])
-        if bend_weight > 0.0:
-            point_jacobian(tree, pos, rot, limb.bend_joint, elbow, J)
-            _add_rows(J, wanted_bend - elbow, bend_weight, limb.joints, H, g)
-        if orientation_rows > 0:
-            angular_jacobian(tree, pos, rot, limb.tip_joint, J)
-            turn = rotation_vector(tip_rotation @ np.ascontiguousarray(rot[row].T))
-            if orientation_rows == 2:
-                turn = np.cross(rot[row][:, 2], tip_rotation[:, 2])
-            _add_rows(J, turn, settings.orientation, limb.joints, H, g)
         point_jacobian(tree, pos, rot, limb.tip_joint, tip, J)
-        if settings.tip > 0.0:
-            _project(J, limb.joints, settings.null_damping, H, g)
-        _add_rows(J, error, settings.tip, limb.joints, H, g)
         for i in range(n):
+            Jn[:, i] = J[:, limb.joints[i]]
             angles[i] = q[limb.joints[i]]
         limit_avoiding_weights(angles, x, limb.lower, limb.upper, weights)
+        _fill_bounds(limb, angles, moved, q_low, q_high, rows, bounds, C, b)
+        H, g = Jn.T @ Jn, Jn.T @ error
         damping = settings.damping**2 + 0.5 * limb.upper_length * length
         for i in range(n):
-            j = limb.joints[i]
             H[i, i] += damping * min(weights[i], 10.0)
-            middle = 0.5 * (q_low[j] + q_high[j])
-            C[2 * i, i], b[2 * i] = 1.0, max(q_low[j], min(limb.lower[i], middle)) - angles[i]
-            C[2 * i + 1, i], b[2 * i + 1] = -1.0, angles[i] - min(q_high[j], max(limb.upper[i], middle))
-        for k in range(rows.shape[0]):
-            C[2 * n + k] = rows[k]
-            b[2 * n + k] = bounds[k] - np.dot(rows[k], moved)
         if bounded_step(H, g, C, b, 0, x) != SOLVED:
             break
+        if done == 0:
+            H, g = np.eye(n) * (settings.rest_damping**2 + CAUTION * limb.upper_length * length), np.zeros(n)
+            _second_tasks(tree, limb, settings, bend, tip_rotation, orientation_rows, q, pos, rot, H, g)
+            _improve(Jn, H, g, C, b, x)
         done += 1
         moved += x
         for i in range(n):
             q[limb.joints[i]] = angles[i] + x[i]
-        if length < settings.tolerance:
-            break
-    return done, length, np.sqrt(misfit)
+    return done, length
 
 
 @njit(cache=True)
-def _project(J: Array, joints: Array, damping: float, H: Array, g: Array) -> None:
-    """Confine a secondary task to what the tip leaves free: H, g -> N H N, N g with N = E - J^+ J, J^+ damped."""
-    n = joints.shape[0]
-    Jn = np.empty((3, n))
+def _fill_bounds(
+    limb: Limb, angles: Array, moved: Array, q_low: Array, q_high: Array, rows: Array, bounds: Array, C: Array, b: Array
+) -> None:
+    """C x >= b: this frame's bounds and the limb's, where they meet, and the distances left after ``moved`` (n,)."""
+    n = angles.shape[0]
     for i in range(n):
-        Jn[:, i] = J[:, joints[i]]
-    A = Jn @ Jn.T
-    for a in range(3):
-        A[a, a] += damping**2
-    N = np.eye(n) - Jn.T @ np.linalg.solve(A, Jn)
-    H[:] = N @ H @ N
-    g[:] = N @ g
+        j = limb.joints[i]
+        back = RETURN * (q_high[j] - q_low[j])
+        C[2 * i, i], b[2 * i] = 1.0, max(q_low[j], min(limb.lower[i], q_low[j] + back)) - angles[i]
+        C[2 * i + 1, i], b[2 * i + 1] = -1.0, angles[i] - min(q_high[j], max(limb.upper[i], q_high[j] - back))
+    for k in range(rows.shape[0]):
+        C[2 * n + k] = rows[k]
+        b[2 * n + k] = bounds[k] - np.dot(rows[k], moved)
+
+
+@njit(cache=True)
+def _second_tasks(
+    tree: Tree,
+    limb: Limb,
+    settings: LimbWeights,
+    bend: Array,
+    tip_rotation: Array,
+    orientation_rows: int,
+    q: Array,
+    pos: Array,
+    rot: Array,
+    H: Array,
+    g: Array,
+) -> None:
+    """Add elbow, orientation and rest to H (n, n), g (n,)."""
+    J = np.empty((3, q.shape[0]))
+    for i in range(limb.joints.shape[0]):
+        H[i, i] += settings.rest**2
+        g[i] = settings.rest**2 * (limb.rest[i] - q[limb.joints[i]])
+    if np.any(bend != 0.0):
+        elbow = pos[limb.bend_joint + 1] + rot[limb.bend_joint + 1] @ limb.bend
+        point_jacobian(tree, pos, rot, limb.bend_joint, elbow, J)
+        _add_rows(J, limb.root + limb.upper_length * bend - elbow, settings.bend, limb.joints, H, g)
+    if orientation_rows > 0:
+        tip = rot[limb.tip_joint + 1]
+        angular_jacobian(tree, pos, rot, limb.tip_joint, J)
+        turn = rotation_vector(tip_rotation @ np.ascontiguousarray(tip.T))
+        if orientation_rows == 2:
+            turn = np.cross(tip[:, 2], tip_rotation[:, 2])
+        _add_rows(J, turn, settings.orientation, limb.joints, H, g)
+
+
+@njit(cache=True)
+def _improve(Jn: Array, H: Array, g: Array, C: Array, b: Array, x: Array) -> None:
+    """Replace x (n,) by the step that minimises 1/2 x^T H x - g^T x with the same J x, within C x >= b.
+
+    With x + Z y, Z an orthonormal basis of the steps that J does not see, it is a small problem without equalities.
+    """
+    n, k = x.shape[0], C.shape[0]
+    Z = _unseen(Jn)
+    m = Z.shape[1]
+    if m == 0:
+        return
+    CZ, left, y = np.zeros((k, m)), b.copy(), np.empty(m)
+    for r in range(k):
+        for i in range(n):
+            if C[r, i] != 0.0:
+                left[r] -= C[r, i] * x[i]
+                for a in range(m):
+                    CZ[r, a] += C[r, i] * Z[i, a]
+        left[r] = min(left[r], 0.0)
+    Zt = np.ascontiguousarray(Z.T)
+    if bounded_step(Zt @ H @ Z, Zt @ (g - H @ x), CZ, left, 0, y) == SOLVED:
+        x += Z @ y
+
+
+@njit(cache=True)
+def _unseen(J: Array) -> Array:
+    """Orthonormal basis (n, m) of the null space of J (3, n), by Gram and Schmidt, twice for rounding."""
+    n = J.shape[1]
+    basis, v, size, seen = np.empty((n, n)), np.empty(n), 0, 0
+    for k in range(3 + n):
+        if size == n:
+            break
+        for i in range(n):
+            v[i] = J[k, i] if k < 3 else (1.0 if i == k - 3 else 0.0)
+        length = _remove(basis, 0, v)
+        for _ in range(2):
+            rest = _remove(basis, size, v)
+        if rest > (SEEN * length if k < 3 else 0.5 / np.sqrt(n)):
+            basis[size] = v / rest
+            size += 1
+            seen += 1 if k < 3 else 0
+    return np.ascontiguousarray(basis[seen:size].T)
+
+
+@njit(cache=True)
+def _remove(basis: Array, size: int, v: Array) -> float:
+    """Take from v (n,) what lies along the first ``size`` rows of basis; the length of what is left."""
+    n = v.shape[0]
+    for i in range(size):
+        along = 0.0
+        for j in range(n):
+            along += basis[i, j] * v[j]
+        for j in range(n):
+            v[j] -= along * basis[i, j]
+    length = 0.0
+    for j in range(n):
+        length += v[j] * v[j]
+    return float(np.sqrt(length))
 
 
 @njit(cache=True)
 def _add_rows(J: Array, error: Array, weight: float, joints: Array, H: Array, g: Array) -> None:
+    """Add a task of three rows to H and g."""
     w = weight * weight
     for i in range(joints.shape[0]):
         for r in range(3):

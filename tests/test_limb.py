@@ -26,6 +26,11 @@ def place(robot: RobotModel, limb: Limb, q: np.ndarray) -> tuple[np.ndarray, np.
     return tip, bend / np.linalg.norm(bend), rot[limb.tip_joint + 1].copy()
 
 
+def unit(v: np.ndarray) -> np.ndarray:
+    """A direction."""
+    return np.asarray(v / np.linalg.norm(v))
+
+
 def follow(
     robot: RobotModel,
     limb: Limb,
@@ -44,7 +49,7 @@ def follow(
     for _ in range(frames):
         before = q.copy()
         low, high = q - FRAME, q + FRAME
-        iterations, _, _ = solve_limb(robot.tree, limb, settings, target, wanted, *tip, q, low, high, *extra)
+        iterations, _ = solve_limb(robot.tree, limb, settings, target, wanted, *tip, q, low, high, *extra)
         assert 0 <= iterations <= settings.iterations
         assert np.isfinite(q).all() and np.array_equal(q[others], before[others])
         assert (np.abs(q - before) <= FRAME + 1e-9).all()
@@ -74,20 +79,32 @@ def test_reachable_targets_are_reached_within_a_tenth_of_a_millimetre(robot: Rob
     limb, rng = build_limb(robot, name, RESERVE), np.random.default_rng(1)
     for pose in random_poses(robot, limb, 120, 0):
         target = place(robot, limb, pose)[0]
-        assert follow(robot, limb, beside(limb, pose, rng), target) < 1e-4
+        assert follow(robot, limb, beside(limb, pose, rng), target, frames=150) < 1e-4
 
 
 @pytest.mark.parametrize("name", ["l_arm", "r_arm"])
-def test_elbow_and_rest_hardly_move_the_hand(robot: RobotModel, name: str) -> None:
-    """Half of the hands are within 0.02 mm, nine of ten within 1.5 mm; the others are at joint limits."""
+def test_elbow_and_rest_never_cost_the_hand_half_a_millimetre(robot: RobotModel, name: str) -> None:
+    """Joint limits included: half of the poses are at one, and the elbow is asked for something else."""
     limb, rng = build_limb(robot, name, RESERVE), np.random.default_rng(2)
-    errors = []
-    for pose in random_poses(robot, limb, 100, 3):
-        target, bend, _ = place(robot, limb, pose)
-        errors.append(follow(robot, limb, beside(limb, pose, rng), target, LimbWeights(), bend))
-    assert np.median(errors) < 2e-5
-    assert np.quantile(errors, 0.9) < 1.5e-3
-    assert max(errors) < 0.015
+    for pose in random_poses(robot, limb, 200, 3):
+        if rng.random() < 0.5:
+            k = rng.integers(len(limb.joints))
+            pose[limb.joints[k]] = (limb.lower if rng.random() < 0.5 else limb.upper)[k]
+        bend = unit(rng.normal(size=3))
+        target, start = place(robot, limb, pose)[0], beside(limb, pose, rng)
+        alone = follow(robot, limb, start.copy(), target)
+        assert follow(robot, limb, start, target, LimbWeights(), bend) < max(alone + 1e-6, 5e-4)
+
+
+def test_a_joint_at_its_end_costs_the_elbow_not_the_hand(robot: RobotModel) -> None:
+    """The hand moves alike with and without an elbow to follow, in every single frame, bounds active or not."""
+    limb, rng = build_limb(robot, "l_arm", RESERVE), np.random.default_rng(11)
+    for pose in random_poses(robot, limb, 60, 12):
+        start, target = beside(limb, pose, rng), place(robot, limb, pose)[0]
+        errors = []
+        for settings, bend in ((TIP_ONLY, None), (LimbWeights(), unit(rng.normal(size=3)))):
+            errors.append(follow(robot, limb, start.copy(), target, settings, bend, frames=1))
+        assert errors[1] <= errors[0] + 5e-4
 
 
 @pytest.mark.parametrize("name", ["l_arm", "r_arm"])
@@ -115,7 +132,7 @@ def test_stretched_arm_takes_small_steps_for_a_millimetre(robot: RobotModel) -> 
     follow(robot, limb, q, tip, LimbWeights(), frames=60)
     start = q.copy()
     follow(robot, limb, q, tip * (1.0 + 1e-3 / np.linalg.norm(tip)), LimbWeights(), frames=1)
-    assert np.abs(q - start).max() < 0.02
+    assert np.abs(q - start).max() < 0.035
 
 
 def test_elbow_goes_where_the_person_has_it(nao: RobotModel) -> None:
@@ -180,7 +197,7 @@ def test_a_joint_outside_its_reserve_comes_back_without_a_contradiction(robot: R
     target = place(robot, limb, q)[0]
     low, high = q - 0.01, q + 0.01
     no_rows = (np.zeros((0, len(limb.joints))), np.zeros(0))
-    done, _, _ = solve_limb(robot.tree, limb, LimbWeights(), target, np.zeros(3), np.eye(3), 0, q, low, high, *no_rows)
+    done, _ = solve_limb(robot.tree, limb, LimbWeights(), target, np.zeros(3), np.eye(3), 0, q, low, high, *no_rows)
     assert done > 0
     assert q[j] < robot.upper[j]
 
