@@ -28,7 +28,7 @@ class TaskLimits:
     """[m/s^2]."""
     head_speed: float = 2.0
     """[rad/s]."""
-    joint_share: float = 0.85
+    joint_share: float = 0.84
     """Share of the motors' no-load speed that a joint may use."""
     leg_acceleration: float = 60.0
     """[rad/s^2] of a leg joint, wherever the feet allow it."""

@@ -129,7 +129,8 @@ class Stride:
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
-        kind, sway = _KINDS[swing.phase], ONE_FOOT if swing.phase in (Phase.FREE, Phase.APPROACH) else QUIET
+        moving = swing.phase in (Phase.FREE, Phase.APPROACH) and not swing.hovering
+        kind, sway = _KINDS[swing.phase], ONE_FOOT if moving else QUIET
         return Plan(*offset, position, rotation, kind, sway, swing.min_height, down, clipped and self.mode.landing)
 
     def _sway_on_both(self) -> SwayLimits:

@@ -64,6 +64,10 @@ class SwingSettings:
     """[m] by which the distance that is near enough grows while it gives way."""
     hover: float = 0.12
     """[s] over the landing place before the foot goes down: what sways comes to rest."""
+    hover_height: float = 0.007
+    """[m] over the floor: a leg that is stretched there has brought the body down with it, and not while it lands."""
+    close: float = 0.02
+    """[m] from the landing place, over the floor, within which the foot comes down to hover."""
     blocked: float = 0.2
     """[s] of refused steps after which a foot that comes down goes up again."""
     settled: float = 0.02
@@ -124,6 +128,11 @@ class Swing:
         late = self._waited / self.settings.patience - 1.0
         return min(max(late, 0.0), 1.0)
 
+    @property
+    def hovering(self) -> bool:
+        """Whether the foot has arrived over its landing place and waits to go down."""
+        return self._hovered > 0.0
+
     def _lift(self, position: Array, dt: float) -> tuple[Array, Array, bool]:
         speed = min(self._velocity[2] + self.settings.lift_acceleration * dt, self.settings.lift_speed)
         self._velocity[:] = (0.0, 0.0, speed)
@@ -136,8 +145,10 @@ class Swing:
         self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float
     ) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
-        self.min_height = min(self.settings.clearance - OVERHEAD, self.min_height + self.settings.lift_speed * dt)
-        target = np.array([goal[0], goal[1], self.settings.clearance])
+        close = math.hypot(goal[0] - position[0], goal[1] - position[1]) < self.settings.close
+        height = self.settings.hover_height if close else self.settings.clearance
+        self.min_height = min(height - OVERHEAD, self.min_height + self.settings.lift_speed * dt)
+        target = np.array([goal[0], goal[1], height])
         level = yaw_matrix(goal_yaw)
         turn = rotation_vector(level @ rotation.T)
         way, angle = target - position, float(np.linalg.norm(turn))
