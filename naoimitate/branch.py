@@ -19,11 +19,15 @@ Array = npt.NDArray[np.float64]
 GAIN = 0.008
 """[m] by which another posture must fit better to be worth a change that takes no time."""
 PRICE = 0.02
-"""[m/s]: more for each second that the change takes."""
+"""[m/s]: more for each second that the change takes, where a spare joint lets the hand stay near its target."""
+PRICE_WITHOUT_SPARE = 0.15
+"""[m/s] where the hand leaves its target for the change."""
 AHEAD = 0.06
 """[s] that the hand's way is continued for the decision: the arm changes before it is stuck."""
 PATIENCE = 2.0
 """[s] of being stuck after which e times less is worth a change: what is lost adds up, what a change costs does not."""
+PATIENCE_WITHOUT_SPARE = 5.0
+"""[s] of the same where the hand leaves its target for the change."""
 STUCK = 0.002
 """[m] off its target from which an arm counts as stuck, and the least that a change must bring: nobody sees less."""
 PAUSE = 0.05
@@ -50,6 +54,9 @@ class Branch:
         mine = np.isin(self._shapes.link - 1, limb.joints)
         self._pairs = np.ascontiguousarray(robot.pairs[mine[robot.pairs].any(axis=1)].reshape(-1, 2))
         count, n = len(self._pairs), len(limb.joints)
+        spare = n > 3
+        self._price = PRICE if spare else PRICE_WITHOUT_SPARE
+        self._patience = PATIENCE if spare else PATIENCE_WITHOUT_SPARE
         self._contact = np.empty(count), np.empty((count, 3)), np.empty((count, 3)), np.empty((count, 3))
         self._frames = np.empty((len(robot.joint_names) + 1, 3)), np.empty((len(robot.joint_names) + 1, 3, 3))
         self._found, self._errors, self._times = np.empty((BINS, n)), np.empty(BINS), np.empty(BINS)
@@ -81,7 +88,7 @@ class Branch:
             self._stuck = 0.0
         elif self.goal is None:
             self._stuck += dt
-        worth = math.exp(-self._stuck / PATIENCE)
+        worth = math.exp(-self._stuck / self._patience)
         if self.goal is not None:
             if local < seek(self._chain, ahead, self.goal, FOLLOW_ITERATIONS) + max(ENOUGH * worth, STUCK):
                 self.goal = None
@@ -92,7 +99,7 @@ class Branch:
     def _search(self, q: Array, angles: Array, target: Array, local: float, worth: float) -> None:
         """The alternative with the least error and time that is worth the change and does not touch the body."""
         alternatives(self._chain, target, angles, self._found, self._errors, self._times)
-        price = self._errors + worth * PRICE * self._times
+        price = self._errors + worth * self._price * self._times
         for k in np.argsort(price, kind="stable"):
             if price[k] + max(GAIN * worth, STUCK) > local:
                 return

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.core.geometry import heading, matrix_from_rotation_vector, rotation_vector, yaw_matrix
+from naoimitate.limits import braking_speed
 
 Array = npt.NDArray[np.float64]
 
@@ -177,11 +178,7 @@ class Swing:
         distance = float(np.linalg.norm(way))
         if distance == 0.0:
             return way
-        half = 0.5 * self.settings.approach_acceleration * dt
-        speed = min(
-            math.sqrt(half * half + 2.0 * self.settings.approach_acceleration * distance) - half,
-            self.settings.approach_speed,
-        )
+        speed = min(braking_speed(distance, self.settings.approach_acceleration, dt), self.settings.approach_speed)
         change = speed * way / distance - self._velocity
         length = float(np.linalg.norm(change))
         if length > self.settings.approach_acceleration * dt:
