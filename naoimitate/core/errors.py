@@ -30,3 +30,15 @@ class RunFileError(NaoimitateError):
 
 class RenderingUnavailable(NaoimitateError):
     """No off-screen GL was found; the program goes on without pictures."""
+
+
+class DatagramError(NaoimitateError):
+    """A datagram is damaged, or not of the protocol that was asked for."""
+
+
+class StreamError(NaoimitateError):
+    """A stream cannot be received or recorded: port in use, nothing comes, another protocol comes."""
+
+
+class DriverError(NaoimitateError):
+    """A robot cannot be reached, or refuses to be driven."""

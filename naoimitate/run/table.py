@@ -66,6 +66,10 @@ class _Timed:
     def offset(self) -> float:
         return self._inner.offset
 
+    @property
+    def may_lift(self) -> bool:
+        return self._inner.may_lift
+
     def place(self, *arguments: Any) -> Pose:
         return self._inner.place(*arguments)
 

@@ -1,0 +1,1 @@
+"""One file a protocol: bytes to landmarks and back, without sockets and clocks."""
