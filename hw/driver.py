@@ -27,6 +27,8 @@ class RobotState:
     fsr: (2, 4) N, force sensors of the left and right foot, columns as ``FSR_NAMES``.
     fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height.
     base_pos: (3,) m and base_quat: (4,) torso in the world, where the driver knows them (simulation), else None.
+    alarms: what the robot complains about, one short sentence each: torque, temperature, battery, a node that is silent.
+    What a robot does not measure is NaN.
     """
 
     time: float
@@ -39,6 +41,7 @@ class RobotState:
     fell: bool
     base_pos: Array | None = None
     base_quat: Array | None = None
+    alarms: tuple[str, ...] = ()
 
 
 @runtime_checkable
@@ -57,6 +60,9 @@ class Driver(Protocol):
 
     def write(self, command: RobotCommand) -> None:
         """Replace the command that the servos follow; never blocks."""
+
+    def soften(self, share: float) -> None:
+        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value: after a fall, in an emergency."""
 
     def stop(self) -> None:
         """End the motion safely and let go of the robot; may be called twice."""

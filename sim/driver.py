@@ -75,6 +75,10 @@ class MujocoDriver:
         """Replace the command that the servos follow from the next period on."""
         self._target = _Target(command.q, command.base_pos, command.base_quat, command.support)
 
+    def soften(self, share: float) -> None:
+        """Turn the servos' stiffness down to a share, 0 to 1, from the next period on."""
+        self._physics.soften(share)
+
     def stop(self) -> None:
         """Stop the clock; the robot stays as it is."""
         self._halt.set()
@@ -90,6 +94,7 @@ class MujocoDriver:
 
     def _place(self) -> None:
         target = self._target = self._stand
+        self._physics.soften(1.0)
         self._physics.place(target.q, target.base_pos, target.base_quat)
         self._state = self._measure(target)
 

@@ -32,6 +32,7 @@ class Physics:
         self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
         self._plates = np.array([self.model.body(plate_name(side)).id for side in SIDES])
         mujoco.mj_forward(self.model, self.data)
+        self._gain, self._bias = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
         self.foot_load = np.zeros(2)
         """(2,) N on the left and right sole, mean over the last ``advance``."""
 
@@ -50,6 +51,11 @@ class Physics:
         self.data.qpos[self._qpos] = q
         self.data.ctrl[self._servos] = q[self._driven]
         mujoco.mj_forward(self.model, self.data)
+
+    def soften(self, share: float) -> None:
+        """Servos with a share, 0 to 1, of their stiffness and damping."""
+        self.model.actuator_gainprm[:] = share * self._gain
+        self.model.actuator_biasprm[:] = share * self._bias
 
     def advance(self, command: Array, duration: float) -> None:
         """Let ``duration`` (s) pass while the servo commands move in a straight line to ``command`` (J,) rad."""

@@ -17,8 +17,8 @@ class Sample:
     """One moment of one person as a sender gives it.
 
     frame: landmarks in the world of ``HumanFrame``: m, z up, NaN where the sender has none; its time is the sender's
-    own clock, s, NaN where it has none. sequence: the sender's counter, None where the protocol has none. person: number
-    of the character on the port.
+    own clock, s, NaN where it has none. sequence: the sender's counter, None where the protocol has none. person:
+    number of the character on the port.
     """
 
     frame: HumanFrame
@@ -27,7 +27,7 @@ class Sample:
 
 
 class Decoder(Protocol):
-    """Bytes of one protocol to samples. It keeps what a sample needs of earlier datagrams, and nothing without bound."""
+    """Bytes of one protocol to samples; keeps what a sample needs of earlier datagrams, and nothing without bound."""
 
     def feed(self, datagram: bytes) -> list[Sample]:
         """The samples that a datagram completes, often one or none.
