@@ -27,7 +27,7 @@ class RobotState:
     fsr: (2, 4) N, force sensors of the left and right foot, columns as ``FSR_NAMES``.
     fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height.
     base_pos: (3,) m and base_quat: (4,) torso in the world, where the driver knows them (simulation), else None.
-    alarms: what the robot complains about, one short sentence each: torque, temperature, battery, a node that is silent.
+    alarms: what the robot complains about, a short sentence each: torque, temperature, battery, a silent node.
     What a robot does not measure is NaN.
     """
 
