@@ -157,7 +157,7 @@ def test_a_broken_opengl_library_is_no_traceback(nao: RobotModel, monkeypatch: p
         Stage(nao, 64, 64)
 
 
-def test_a_missing_software_renderer_does_not_spoil_the_others() -> None:
+def test_a_missing_software_renderer_does_not_spoil_the_others(tmp_path: Path) -> None:
     """In processes of their own, because MuJoCo and PyOpenGL read their variables when they are imported."""
     code = """
 import importlib, os
@@ -181,7 +181,7 @@ except RenderingUnavailable as error:
         environment = {**os.environ, "MUJOCO_GL": chosen}
         environment.pop("PYOPENGL_PLATFORM", None)
         result = subprocess.run(
-            [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=False
+            [sys.executable, "-c", code], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
         )  # fmt: skip
         assert result.stdout == "None\n", result.stderr
 
