@@ -19,6 +19,7 @@ from naoimitate.balance.planted import Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Footing, Reach, Retargeting
 from naoimitate.balance.stride import Stride
+from naoimitate.blend import Blend
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import CalibrationError
 from naoimitate.core.frames import GivenUp, HumanFrame, RobotCommand
@@ -57,6 +58,7 @@ class Imitator:
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
         self._pose: Pose | None = None
+        self._blend: Blend | None = None
         self._acceleration = np.where(legs.variable >= 0, s.limits.leg_acceleration, s.limits.arm_acceleration)
         self._hurried: Array = np.zeros(2)
         self._unreached: Array = np.full(2, np.inf)
@@ -79,14 +81,37 @@ class Imitator:
 
     def use(self, subject: Subject) -> None:
         """Imitate a person who was measured before; the next step starts from a stand."""
-        make = reachable_mapping if self.settings.reference == "reachable" else virtual_mapping
-        self.mapping: Mapping = make(self.robot, subject.body, subject.reference)
-        self._subject, self._pose = subject, None
-        self._observer = Observer(subject.body, subject.tpose, self.settings.hand_orientation == "follow")
+        self.turn_to(subject)
+        self._pose, self._blend = None, None
         limits, still = self.settings.limits, np.zeros((2, 3))
         self._hands = Follower(still, limits.hand_speed, limits.hand_acceleration)
         self._feet = Follower(still, limits.foot_speed, limits.foot_acceleration)
         self._time, self._last_time, self._human_offset = 0.0, math.nan, 0.5
+
+    def turn_to(self, subject: Subject) -> None:
+        """Imitate another person from the next step on, from where the robot is."""
+        make = reachable_mapping if self.settings.reference == "reachable" else virtual_mapping
+        self.mapping: Mapping = make(self.robot, subject.body, subject.reference)
+        self._subject = subject
+        self._observer = Observer(subject.body, subject.tpose, self.settings.hand_orientation == "follow")
+
+    def stand(self) -> None:
+        """Start from the robot's posture ``stand``, for a robot that stands there; call after ``use``."""
+        self._arms.reset()
+        self._pose = self._retargeting.stand(self.robot.postures["stand"].copy())
+        self._stand_still()
+
+    def blend(self, duration: float) -> None:
+        """Go over to the person's posture within ``duration`` s from where the robot is; feet stay down meanwhile."""
+        if self._pose is not None:
+            feet, hands = self._pose.soles_in_base - self._hips, self._arms.hands(self._pose)
+            here = np.array([hands[0], feet[0], hands[1], feet[1]])
+            self._blend = Blend(here, self._maker.offset(self._pose, self.offset), duration)
+
+    @property
+    def blending(self) -> bool:
+        """Whether a blend is under way."""
+        return self._blend is not None
 
     def step(
         self,
@@ -108,15 +133,28 @@ class Imitator:
         seen = self._observer.see(frame, support)
         targets = self._within_reach(self.mapping.targets(seen.body.posture))
         footing = self._footing(seen, targets, ahead, may_lift)
+        if self._blend is not None:
+            targets, footing = self._blended(self._blend, targets, footing)
         if self._pose is None:
             given_up, iterations = self._start(seen, targets, footing), 0
         else:
             elapsed = frame.time - self._last_time if dt is None else dt
             elapsed = min(self.settings.limits.max_dt, max(self.settings.limits.min_dt, elapsed))
             self._time += elapsed
+            if self._blend is not None:
+                self._blend.advance(elapsed)
             given_up, iterations = self._advance(self._pose, seen, targets, footing, elapsed)
         self._last_time = frame.time
         return self._command(seen, footing, given_up, iterations)
+
+    def _blended(self, blend: Blend, targets: Array, footing: Footing) -> tuple[Array, Footing]:
+        """What is asked for while the robot blends in: no foot is lifted before it is over."""
+        if blend.done:
+            self._blend = None
+            return targets, footing
+        targets, offset = blend.mix(targets, footing.offset)
+        support = footing.support if footing.support == self.mode.stance else "D"
+        return targets, replace(footing, support=support, offset=offset)
 
     def _within_reach(self, targets: Array) -> Array:
         """Targets (4, 3) m, those brought back that are too far off to be meant: the solvers work with short ways."""

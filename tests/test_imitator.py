@@ -444,3 +444,33 @@ def test_the_papers_settings_keep_limits_and_balance(nao: RobotModel) -> None:
             judge._motion(judge.commands[-1], command)
         judge.commands.append(command)
     assert judge.supports.startswith("DL")
+
+
+@pytest.mark.parametrize("retarget", ["planted", "paper"])
+def test_a_robot_that_stands_blends_in_without_a_jump(robot: RobotModel, retarget: str) -> None:
+    imitator = Imitator(robot, Settings(retarget=retarget))
+    frame = still(1)[0]
+    imitator.calibrate(tpose())
+    imitator.stand()
+    imitator.blend(1.0)
+    q, speed = robot.postures["stand"], np.zeros(len(robot.joint_names))
+    for _ in range(150):
+        command = imitator.step(frame, 0.01)
+        assert command.support == "D"
+        after = (command.q - q) / 0.01
+        assert (np.abs(after) <= 0.9 * robot.speed).all()
+        assert np.abs(after - speed).max() * 0.01 < 0.02, "rad of a step that were not in the one before"
+        q, speed = command.q, after
+    assert not imitator.blending
+
+
+def test_who_takes_over_is_imitated_from_where_the_robot_is(nao: RobotModel) -> None:
+    imitator = Imitator(nao)
+    first = imitator.calibrate(tpose())
+    frames = still(30)
+    last = [imitator.step(f, 0.01) for f in frames][-1]
+    imitator.turn_to(first)
+    imitator.blend(0.5)
+    command = imitator.step(frames[-1], 0.01)
+    assert np.abs(command.q - last.q).max() < 0.01
+    assert command.time == pytest.approx(last.time + 0.01)

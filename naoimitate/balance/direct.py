@@ -38,6 +38,11 @@ class Direct:
         self._yaw = heading(footing.torso)
         return self._planted.place(q, feet, footing)
 
+    def stand(self, q: Array) -> Pose:
+        """See ``Planted.stand``."""
+        self.mode, self.offset, self._yaw = Mode.DOUBLE, 0.5, 0.0
+        return self._planted.stand(q)
+
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: legs by the paper's few iterations, nothing else."""
         self.mode = _MODES.get(footing.support, self.mode)

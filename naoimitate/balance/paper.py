@@ -90,7 +90,13 @@ class PaperFeet:
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """The stand of frame 0; see ``Planted.place``."""
-        pose = self._planted.place(q, feet, footing)
+        return self._begin(self._planted.place(q, feet, footing))
+
+    def stand(self, q: Array) -> Pose:
+        """See ``Planted.stand``."""
+        return self._begin(self._planted.stand(q))
+
+    def _begin(self, pose: Pose) -> Pose:
         self._fsm, self._landed, self._side, self._share = SupportFsm(), False, 0, 1.0
         self._offset, self._speed = self._planted.offset, 0.0
         self._mapped = pose.q[self._mapped_joints]

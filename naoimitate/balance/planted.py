@@ -135,6 +135,19 @@ class Planted:
             return np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
         return np.array([1.0 - offset, offset])
 
+    def stand(self, q: Array) -> Pose:
+        """Stand in double support as q (J,) rad does, its soles flat, its feet around the origin, facing +x."""
+        pose = self._maker.stand(q)
+        self._stride.restart(*self._centred(pose.sole_pos * [1.0, 1.0, 0.0], pose.sole_rot), self._maker.offset(pose))
+        self._sway.rest()
+        return self._maker.hang(q, 1, self._stride.planted_pos, self._stride.planted_rot)
+
+    @staticmethod
+    def _centred(sole_pos: Array, sole_rot: Array) -> tuple[Array, Array]:
+        """Soles (2, 3) m, (2, 3, 3) moved and turned over the floor until they stand around the origin, facing +x."""
+        R = yaw_matrix(-wrap(0.5 * (heading(sole_rot[0]) + heading(sole_rot[1]))))
+        return (sole_pos - sole_pos.mean(axis=0)) @ R.T, R @ sole_rot
+
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support nearest to the footing, between the feet at the origin, facing +x.
 
@@ -158,8 +171,6 @@ class Planted:
             if closed:
                 stride.planted_pos[0], stride.planted_rot[0] = position, rotation
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)
-        middle = heading(stride.planted_rot[0]) * 0.5
-        R, centre = yaw_matrix(-wrap(middle)), stride.planted_pos.mean(axis=0)
         self._sway.rest()
-        stride.restart((stride.planted_pos - centre) @ R.T, R @ stride.planted_rot, offset)
+        stride.restart(*self._centred(stride.planted_pos, stride.planted_rot), offset)
         return self._maker.hang(pose.q, 1, stride.planted_pos, stride.planted_rot)

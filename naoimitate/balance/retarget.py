@@ -86,5 +86,8 @@ class Retargeting(Protocol):
         feet: (2, 3) m, the targets (5) of the soles.
         """
 
+    def stand(self, q: Array) -> Pose:
+        """Stand in double support as q (J,) rad does, its soles flat, its feet around the origin, facing +x."""
+
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: arms and head from q_arms (J,) rad, feet (2, 3) m the targets (5) of the soles."""

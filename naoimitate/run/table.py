@@ -70,6 +70,9 @@ class _Timed:
     def may_lift(self) -> bool:
         return self._inner.may_lift
 
+    def stand(self, *arguments: Any) -> Pose:
+        return self._inner.stand(*arguments)
+
     def place(self, *arguments: Any) -> Pose:
         return self._inner.place(*arguments)
 

@@ -1,0 +1,42 @@
+"""Blending in: from where the robot is to the person's posture, along a minimum-jerk profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Blend:
+    """Targets that go over from where they were to where they are wanted.
+
+    targets: (4, 3) m, the posture to start from. offset: the normalised offset there. duration: s.
+    """
+
+    targets: Array
+    offset: float
+    duration: float
+    elapsed: float = 0.0
+
+    def advance(self, dt: float) -> None:
+        """Let dt s pass."""
+        self.elapsed += dt
+
+    @property
+    def done(self) -> bool:
+        """Whether nothing is left of the start."""
+        return self.elapsed >= self.duration
+
+    @property
+    def share(self) -> float:
+        """How much of the wish counts, 0 to 1: s^3 (10 - 15 s + 6 s^2) (Flash and Hogan 1985)."""
+        s = min(self.elapsed / self.duration, 1.0) if self.duration > 0.0 else 1.0
+        return s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+
+    def mix(self, targets: Array, offset: float) -> tuple[Array, float]:
+        """Targets (4, 3) m and offset of this moment."""
+        return self.targets + self.share * (targets - self.targets), self.offset + self.share * (offset - self.offset)
