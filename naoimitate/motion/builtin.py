@@ -104,7 +104,15 @@ def single_support_phases(motion: Motion) -> tuple[tuple[str, float, float], ...
 
 def tpose() -> HumanFrame:
     """The person of the built-in motions in a T-pose that faces +x."""
-    script = _standing(0.01, left_arm=Track(T_ARM), right_arm=Track(T_ARM))
+    return _still(_standing(0.01, left_arm=Track(T_ARM), right_arm=Track(T_ARM)))
+
+
+def relaxed() -> HumanFrame:
+    """The person of the built-in motions, standing with hanging arms and facing +x."""
+    return _still(_standing(0.01))
+
+
+def _still(script: Script) -> HumanFrame:
     landmarks, orientations = pose(BODY, parameters(script, BODY))
     return HumanFrame(time=0.0, landmarks=landmarks[0], orientations=orientations[0], support="D")
 

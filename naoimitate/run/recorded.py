@@ -16,6 +16,7 @@ from naoimitate.human.support import annotate
 from naoimitate.imitator import Imitator
 from naoimitate.motion.stretch import FRAMEWISE, stretch
 from naoimitate.robot.model import RobotModel
+from naoimitate.run.columns import columns, constants
 from naoimitate.run.file import Run
 from naoimitate.run.pace import AutoPace, ConstantPace
 from naoimitate.run.provenance import provenance
@@ -140,36 +141,7 @@ def _run(
     moments: np.ndarray,
     step_times: np.ndarray,
 ) -> Run:
-    support = np.array([c.support for c in commands])
-    contacts = np.stack([support != "R", support != "L"], axis=1)
-    mapping = imitator.mapping
-    return Run(
-        robot=robot.name,
-        robot_version=robot.version,
-        method="static",
-        retarget=settings.retarget,
-        source=motion.source or motion.name,
-        provenance=text,
-        time=np.array([c.time for c in commands]),
-        human_time=moments,
-        joint_names=np.array(robot.joint_names),
-        q=np.array([c.q for c in commands]),
-        base_pos=np.array([c.base_pos for c in commands]),
-        base_quat=np.array([c.base_quat for c in commands]),
-        support=support,
-        human_support=np.array([motion.at(float(t)).support or "D" for t in moments]),
-        contact_names=np.array(["l_sole", "r_sole"]),
-        contacts=contacts,
-        contact_points=np.where(contacts[:, :, None], np.array([c.soles for c in commands]), np.nan),
-        offset=np.array([c.offset for c in commands]),
-        human_offset=np.array([c.human_offset for c in commands]),
-        com=np.array([c.com for c in commands]),
-        human_posture=np.array([c.posture for c in commands]),
-        ref_human=mapping.ref_human,
-        ref_robot=mapping.ref_robot,
-        scale=mapping.scale,
-        hand_opening=np.array([c.hand_opening for c in commands]),
-        given_up=np.array([int(c.given_up) for c in commands], dtype=np.uint8),
-        step_time=step_times,
-        ik_iterations=np.array([c.ik_iterations for c in commands]),
-    )
+    arrays = columns(commands)
+    arrays["human_support"] = np.array([motion.at(float(t)).support or "D" for t in moments])
+    fixed = constants(robot, imitator.mapping, settings.retarget, motion.source or motion.name, text)
+    return Run(**fixed, **arrays, human_time=moments, step_time=step_times)

@@ -1,0 +1,118 @@
+"""The input filter: each landmark as a point of nearly constant velocity (Kalman 1960), outliers left out."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from filterpy.common import Q_discrete_white_noise
+from filterpy.kalman import predict, update
+
+from naoimitate.core.frames import HumanFrame
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """What the filter believes."""
+
+    noise: float = 0.004
+    """[m] of a landmark, standard deviation."""
+    acceleration: float = 30.0
+    """[m/s^2] of a landmark, standard deviation from frame to frame: quick hands are followed with little delay."""
+    gate: float = 6.0
+    """Standard deviations of the prediction beyond which a measurement is an outlier."""
+    least_gate: float = 0.08
+    """[m] within which nothing is an outlier."""
+    believed: int = 3
+    """Outliers in a row after which they are the truth: somebody has jumped, or the source has lost its origin."""
+    longest_gap: float = 0.25
+    """[s] without a landmark after which its velocity is forgotten."""
+
+
+class LandmarkFilter:
+    """Position and velocity of all landmarks; dt may vary from frame to frame."""
+
+    def __init__(self, settings: FilterSettings | None = None) -> None:
+        self._s = settings or FilterSettings()
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the person."""
+        self._time = math.nan
+        self._state: Array | None = None
+        self._covariance = np.diag([self._s.noise**2, 1.0])
+        self.outliers = 0
+        """Measurements that were left out so far."""
+
+    def step(self, frame: HumanFrame) -> HumanFrame:
+        """The frame, filtered; missing and outlying landmarks are predicted for a short while, then missing."""
+        measured = np.asarray(frame.landmarks, dtype=np.float64)
+        known = np.isfinite(measured).all(axis=1)
+        dt = frame.time - self._time
+        if self._state is None or not 0.0 < dt < self._s.longest_gap:
+            self._start(measured, frame.time)
+            return frame
+        self._time = frame.time
+        position, velocity = self._state
+        predicted = position + dt * velocity
+        gain, reach = self._gains(dt)
+        off = np.linalg.norm(np.where(known[:, None], measured - predicted, 0.0), axis=1)
+        outlying = known & (off > max(self._s.gate * reach, self._s.least_gate))
+        self._strikes = np.where(outlying, self._strikes + 1, 0)
+        self.outliers += int(outlying.sum())
+        moved = outlying & (self._strikes >= self._s.believed)
+        new = known & (moved | ~np.isfinite(predicted).all(axis=1) | (self._age > self._s.longest_gap))
+        good = known & ~outlying & ~new
+        innovation = np.where(good[:, None], measured - predicted, 0.0)
+        position, velocity = predicted + gain[0] * innovation, velocity + gain[1] * innovation
+        position[new], velocity[new] = measured[new], 0.0
+        self._age = np.where(good | new, 0.0, self._age + dt)
+        position[self._age > self._s.longest_gap] = np.nan
+        self._strikes[new] = 0
+        self._state = np.stack([position, velocity])
+        return replace(frame, landmarks=position.copy())
+
+    def predicted(self, time: float, frame: HumanFrame) -> HumanFrame:
+        """The frame with its landmarks continued to a later time."""
+        if self._state is None:
+            return frame
+        position, velocity = self._state
+        return replace(frame, time=time, landmarks=position + (time - self._time) * velocity)
+
+    def delay(self, rate: float, frequency: float = 1.0) -> float:
+        """By how much (s) a landmark that swings at ``frequency`` Hz is late, at frames of ``rate`` Hz."""
+        dt, covariance = 1.0 / rate, self._covariance.copy()
+        for _ in range(200):
+            gain, covariance = _kalman(dt, covariance, self._s)
+        step = np.array([[1.0, dt], [0.0, 1.0]])
+        left = (np.eye(2) - np.outer(gain, [1.0, 0.0])) @ step
+        z = np.exp(2j * np.pi * frequency * dt)
+        response = (np.linalg.solve(z * np.eye(2) - left, gain) * z)[0]
+        return float(-np.angle(response) / (2.0 * np.pi * frequency))
+
+    def _start(self, measured: Array, time: float) -> None:
+        self._time, self._state = time, np.stack([measured, np.zeros_like(measured)])
+        self._covariance = np.diag([self._s.noise**2, 1.0])
+        self._age, self._strikes = np.zeros(len(measured)), np.zeros(len(measured), dtype=np.int64)
+        self._age[~np.isfinite(measured).all(axis=1)] = math.inf
+        self._state[1][~np.isfinite(measured)] = 0.0
+
+    def _gains(self, dt: float) -> tuple[Array, float]:
+        """Gains of position and velocity, and the standard deviation (m) of what is measured against its prediction."""
+        gain, self._covariance = _kalman(dt, self._covariance, self._s)
+        return gain, self._s.noise / math.sqrt(max(1.0 - gain[0], 1e-6))
+
+
+def _kalman(dt: float, covariance: Array, settings: FilterSettings) -> tuple[Array, Array]:
+    """One step of the covariance (2, 2) that all landmarks share; returns the gain (2,) and the next covariance."""
+    step, measure = np.array([[1.0, dt], [0.0, 1.0]]), np.array([[1.0, 0.0]])
+    noise = Q_discrete_white_noise(dim=2, dt=dt, var=settings.acceleration**2)
+    x, covariance = predict(np.zeros((2, 1)), covariance, step, Q=noise)
+    _, after, _, gain, *_ = update(
+        x, covariance, np.zeros((1, 1)), np.array([[settings.noise**2]]), measure, return_all=True
+    )
+    return gain[:, 0], after

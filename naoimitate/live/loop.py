@@ -1,0 +1,87 @@
+"""The live loop: datagrams in, commands out, one thread; the only place with a clock."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from naoimitate.core.errors import StreamError
+from naoimitate.hw.driver import Driver
+from naoimitate.live.receiver import Datagram, Receiver
+from naoimitate.live.session import Session, Tick
+from naoimitate.live.stream import Stream
+
+SHORTEST = 0.002
+"""[s] between two steps: a frame that comes sooner waits so long."""
+
+
+@dataclass(frozen=True)
+class Beat:
+    """One turn of the loop, for those who watch or write: the tick, when, and how long it took.
+
+    now: s, monotonic. latency: s from the arrival of the datagram that caused the step to the driver, NaN without one.
+    step_time: s of wall time in the session.
+    """
+
+    tick: Tick
+    now: float
+    latency: float
+    step_time: float
+
+
+@dataclass
+class Loop:
+    """A session between a stream and a driver.
+
+    watch: called with every beat. record: called with every datagram, before it is decoded. ended: asked in every turn.
+    """
+
+    session: Session
+    stream: Stream
+    receiver: Receiver
+    driver: Driver
+    watch: list[Callable[[Beat], None]] = field(default_factory=list)
+    record: Callable[[Datagram], None] | None = None
+
+    def run(self, duration: float = math.inf, ended: Callable[[], bool] = lambda: False) -> None:
+        """Run for ``duration`` s, or until ``ended``; the driver is connected, and is left connected.
+
+        Raises StreamError at the end when nothing that came was understood.
+        """
+        begin = last = time.monotonic()
+        self.session.start()
+        while not ended() and last - begin < duration:
+            self._receive(last)
+            newest = self.stream.newest()
+            if newest is not None:
+                arrival, sample = newest
+                self.session.see(sample.frame, arrival)
+            now = time.monotonic()
+            started = time.perf_counter()
+            tick = self.session.step(now)
+            spent = time.perf_counter() - started
+            self.driver.write(tick.command)
+            latency = time.monotonic() - newest[0] if newest is not None and tick.fresh else math.nan
+            last = now
+            beat = Beat(tick, now, latency, spent)
+            for watcher in self.watch:
+                watcher(beat)
+        complaint = self.stream.complaint()
+        if complaint:
+            raise StreamError(complaint)
+
+    def _receive(self, last: float) -> None:
+        """Wait for a frame, or for the driver's period; what came is taken."""
+        due, soonest, before = last + self.driver.period, last + SHORTEST, self.stream.counts.frames
+        while True:
+            now = time.monotonic()
+            fresh = self.stream.counts.frames != before
+            if now >= due or (fresh and now >= soonest):
+                return
+            self.receiver.wait((soonest if fresh else due) - now)
+            for datagram in self.receiver.read():
+                if self.record is not None:
+                    self.record(datagram)
+                self.stream.take(datagram.arrival, datagram.address, datagram.payload)

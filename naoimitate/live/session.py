@@ -1,0 +1,228 @@
+"""A live session: frames of the operator and the passing of time become commands for the robot.
+
+No socket, no clock, no driver: time is told with every call, so that a recording gives the same commands again. In
+every state the imitator makes the command: of the operator, of their last posture, or of a calm stand-in who stands
+relaxed or shows the T-pose. So all that the robot ever does is a statically stable step within its limits.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from naoimitate.calib.subject import Subject, calibrate
+from naoimitate.core.errors import CalibrationError
+from naoimitate.core.frames import HumanFrame, RobotCommand
+from naoimitate.fsm.session import Action, Event, SessionFsm, State
+from naoimitate.human.mirror import mirrored_frame
+from naoimitate.imitator import Imitator
+from naoimitate.live.clock import SenderClock
+from naoimitate.live.filter import LandmarkFilter
+from naoimitate.live.tpose import TPoseWatch
+from naoimitate.motion.builtin import relaxed, tpose
+from naoimitate.robot.model import RobotModel
+from naoimitate.settings import Settings
+
+
+@dataclass(frozen=True)
+class SessionSettings:
+    """How a session deals with its operator."""
+
+    predict: float = 0.1
+    """[s] for which landmarks are continued when no frame comes."""
+    hold: float = 0.25
+    """[s] without a frame after which the robot keeps the last posture."""
+    back: float = 10.0
+    """[s] without a frame after which the robot goes back to a stand."""
+    blend_in: float = 1.5
+    """[s] of a minimum-jerk way from where the robot is to the operator's posture."""
+    blend_back: float = 2.0
+    """[s] of the way to a stand, or to the T-pose that asks for one."""
+    filtered: bool = True
+    """Whether landmarks are filtered."""
+    mirror: bool = False
+    """Whether the operator faces the robot: left and right are exchanged."""
+
+
+@dataclass(frozen=True)
+class Tick:
+    """One step of a session.
+
+    command: for the driver. state: of the session machine. arrival: s, of the newest frame of the operator that this
+    command uses, NaN unless tracking. fresh: whether a frame caused the step. began: whether a run begins here.
+    """
+
+    command: RobotCommand
+    state: State
+    arrival: float
+    fresh: bool
+    began: bool
+
+
+_STANDING = (State.IDLE, State.WAITING, State.RETURNING)
+_OPERATED = (State.BLENDING, State.TRACKING)
+_KEPT = (State.HOLDING, State.CLUTCHED)
+
+
+class Session:
+    """The session machine with the imitator, the input filter and the T-pose watch that belong to it."""
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        settings: Settings | None = None,
+        live: SessionSettings | None = None,
+        subject: Subject | None = None,
+    ) -> None:
+        self.imitator = Imitator(robot, settings)
+        self._live = live or SessionSettings()
+        self._fsm = SessionFsm(measured=subject is not None)
+        self._watch, self._filter, self._clock = TPoseWatch(), LandmarkFilter(), SenderClock()
+        self._stand_in = calibrate(tpose())
+        self._still, self._tpose = relaxed(), tpose()
+        self.subject = subject
+        self.reason = ""
+        """Why the session is in fault."""
+        self._person: HumanFrame | None = None
+        self._fresh: HumanFrame | None = None
+        self._arrival, self._now = -math.inf, math.nan
+        self._played = ""
+        self._began = False
+
+    @property
+    def state(self) -> State:
+        """The state of the session machine."""
+        return self._fsm.state
+
+    @property
+    def countdown(self) -> float:
+        """Seconds for which the T-pose still has to be held."""
+        return self._watch.left
+
+    def warm_up(self) -> None:
+        """Step through postures until everything is compiled; the session begins afterwards as if never used."""
+        self.imitator.use(self._stand_in)
+        self.imitator.stand()
+        for frame, support in ((self._tpose, "D"), (self._still, "L"), (self._still, "D")):
+            for _ in range(100):
+                self.imitator.step(frame, 0.05, support=support)
+        warm = LandmarkFilter()
+        for k in range(3):
+            warm.step(replace(self._still, time=0.01 * k))
+
+    def start(self) -> None:
+        """The robot stands in its posture ``stand``, connected."""
+        self.imitator.use(self._stand_in)
+        self.imitator.stand()
+        self._played = "standing"
+        self._take(Event.START)
+
+    def see(self, frame: HumanFrame, arrival: float) -> None:
+        """The newest frame of the operator, its time on the sender's clock (NaN: not told), and when it came."""
+        frame = replace(frame, time=self._clock.moment(frame.time, arrival))
+        if self._live.mirror:
+            frame = mirrored_frame(frame)
+        self._fresh, self._arrival = frame, arrival
+
+    def clutch(self) -> None:
+        """The operator pauses, or goes on."""
+        self._watch.reset()
+        self._take(Event.CLUTCH)
+
+    def fault(self, reason: str) -> None:
+        """Something forbids to go on."""
+        self.reason = reason
+        self._take(Event.FAULT)
+
+    def reset(self) -> None:
+        """After a fault: the robot stands in its posture ``stand`` again."""
+        if self._take(Event.RESET) is not None:
+            self.start_again()
+
+    def start_again(self) -> None:
+        """Imitate the stand-in from the robot's own stand."""
+        self.imitator.use(self._stand_in)
+        self.imitator.stand()
+        self._played, self._person, self.reason = "standing", None, ""
+        self._arrival = -math.inf
+
+    def stop(self) -> None:
+        """The end."""
+        self._take(Event.STOP)
+
+    def step(self, now: float) -> Tick:
+        """The next command, at ``now`` s."""
+        fresh, self._began = self._fresh, False
+        dt = now - self._now if math.isfinite(self._now) else 0.01
+        self._now, self._fresh = now, None
+        if fresh is not None:
+            self._observe(fresh)
+        else:
+            self._miss(now)
+        command = self._imitate(now, fresh is not None, dt)
+        if self.state is State.BLENDING and not self.imitator.blending:
+            self._take(Event.BLENDED)
+        if self.state is State.RETURNING and not self.imitator.blending and command.support == "D":
+            self._take(Event.STANDING)
+        arrival = self._arrival if self.state is State.TRACKING else math.nan
+        return Tick(command, self.state, arrival, fresh is not None and self.state in _OPERATED, self._began)
+
+    def _observe(self, frame: HumanFrame) -> None:
+        """Take a frame of the operator: filtered, watched for a T-pose, and told to the machine."""
+        self._person = self._filter.step(frame) if self._live.filtered else frame
+        self._take(Event.FRAME)
+        if self.state in (State.CALIBRATING, State.CLUTCHED):
+            held = self._watch.see(self._person)
+            if held is not None:
+                self._measure(held)
+
+    def _measure(self, held: HumanFrame) -> None:
+        """Calibrate with a T-pose that was held; one that cannot serve is waited out."""
+        self._watch.reset()
+        try:
+            self.subject = calibrate(held)
+        except CalibrationError:
+            return
+        self._take(Event.TPOSE)
+
+    def _miss(self, now: float) -> None:
+        """No frame in this step: what that means after so long."""
+        silent = now - self._arrival
+        if silent > self._live.hold:
+            self._take(Event.LATE)
+        if silent > self._live.back:
+            self._take(Event.LOST)
+
+    def _take(self, event: Event) -> Action | None:
+        action = self._fsm.take(event)
+        if action is Action.CALIBRATE:
+            self._began = True
+        if action in (Action.BLEND, Action.CALIBRATE):
+            self._played = ""
+        return action
+
+    def _imitate(self, now: float, fresh: bool, dt: float) -> RobotCommand:
+        """One step of the imitator, of whom the state says."""
+        if self.state in _OPERATED or (self.state in _KEPT and self._played == "operator"):
+            assert self._person is not None and self.subject is not None
+            self._play("operator", self.subject, self._live.blend_in)
+            return self.imitator.step(self._expected(now, fresh), dt)
+        showing = self.state is State.CALIBRATING
+        self._play("T-pose" if showing else "standing", self._stand_in, self._live.blend_back)
+        return self.imitator.step(self._tpose if showing else self._still, dt)
+
+    def _play(self, who: str, subject: Subject, duration: float) -> None:
+        """Imitate somebody from now on, from where the robot is."""
+        if self._played == who:
+            return
+        self._played = who
+        self.imitator.turn_to(subject)
+        self.imitator.blend(duration)
+
+    def _expected(self, now: float, fresh: bool) -> HumanFrame:
+        """The operator now: as seen, continued for a short while, or as last seen."""
+        person = self._person
+        assert person is not None
+        if fresh or not self._live.filtered or self.state in _KEPT:
+            return person
+        return self._filter.predicted(min(now, person.time + self._live.predict), person)
