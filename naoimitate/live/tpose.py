@@ -20,8 +20,6 @@ GAP = 0.3
 """[s] without a frame after which the count begins again."""
 _UNWATCHED = ("l_hand", "r_hand", "l_toe", "r_toe", "head", "chest")
 _WATCHED = [row for name, row in LANDMARK.items() if name not in _UNWATCHED]
-    row for name, row in LANDMARK.items() if name not in ("l_hand", "r_hand", "l_toe", "r_toe", "head", "chest")
-]
 
 
 class TPoseWatch:
