@@ -1,0 +1,269 @@
+"""The only way to a driver: every command passes the gate, every reading the fall latch, and it can always be stopped.
+
+``GuardedDriver`` is a driver itself, so that a program cannot tell the difference and has nothing else to hold. Its
+clock is real time; the gate and the latch behind it are pure.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from naoimitate.command_gate import CommandGate
+from naoimitate.core.errors import DriverError, NaoimitateError
+from naoimitate.core.frames import Array, RobotCommand
+from naoimitate.fsm.fall_latch import Action, FallLatch, FallLimits
+from naoimitate.hw.driver import Driver, RobotState
+from naoimitate.hw.lean import lean
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+"""Where the torso is meant to be before the first command."""
+
+NOT_LIVE = "not live"
+"""Why a command is refused before ``connect`` and after the end."""
+
+
+class Condition(enum.Enum):
+    """What a guarded robot is in; the value is a word for people."""
+
+    OFF = "off"
+    """Not connected yet."""
+    CONNECTING = "connecting"
+    LIVE = "live"
+    """Commands pass."""
+    FALLING = "falling"
+    """Soft; no command passes."""
+    FALLEN = "fallen"
+    """Let go of after a fall, until ``reset``."""
+    EMERGENCY = "emergency stop"
+    """Let go of by ``emergency_stop``, until ``reset``."""
+    STOPPED = "stopped"
+    """Let go of in peace."""
+
+
+@dataclass(frozen=True)
+class GuardSettings:
+    """What the guard does when something is wrong."""
+
+    fall: FallLimits = field(default_factory=FallLimits)
+    fall_stiffness: float = 0.1
+    """Share of the servos' stiffness while the robot falls: soft joints give way, and gears survive."""
+    emergency_stiffness: float = 0.6
+    """The same in an emergency stop: people caught get loose, and a robot on both feet still stands."""
+    stop_on_alarm: bool = False
+    """Whether an alarm of the driver ends the motion; otherwise it is only shown."""
+    alarm_patience: float = 1.0
+    """[s] for which an alarm must last to end the motion."""
+
+
+@dataclass(frozen=True)
+class GuardStatus:
+    """What to show to an operator.
+
+    condition: see ``Condition``. accepted: commands that reached the robot. refused: how many did not, by reason (one
+    command may have several). refusing: why the newest command was refused; empty when it passed. held: s since a
+    command passed. lean: rad of the torso away from its plan at the last reading, NaN where nobody
+    measures it. alarms: of the driver. problem: what a driver complained about when it was last used, or empty.
+    """
+
+    condition: Condition
+    accepted: int
+    refused: Mapping[str, int]
+    refusing: tuple[str, ...]
+    held: float
+    lean: float
+    alarms: tuple[str, ...]
+    problem: str
+
+
+class GuardedDriver:
+    """A driver behind a gate and a fall latch. Nobody else should hold the driver that it is given.
+
+    All methods may be called from any thread, ``emergency_stop`` from a signal handler too.
+    """
+
+    def __init__(
+        self,
+        driver: Driver,
+        gate: CommandGate,
+        settings: GuardSettings | None = None,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.__driver, self._gate, self._settings, self._clock = driver, gate, settings or GuardSettings(), clock
+        self._lock = threading.RLock()
+        self._latch = FallLatch(self._settings.fall)
+        self._ended = threading.Lock()
+        self._condition, self._problem = Condition.OFF, ""
+        self._accepted, self._refused, self._refusing = 0, Counter[str](), ()
+        self._refusing: tuple[str, ...]
+        self._alarms: tuple[str, ...] = ()
+        self._command: RobotCommand | None = None
+        self._passed = self._checked = self._sensed = self._alarmed = 0.0
+        self._lean = math.nan
+
+    @property
+    def period(self) -> float:
+        """Time between two uses of the newest command, s."""
+        return self.__driver.period
+
+    @property
+    def command(self) -> RobotCommand | None:
+        """The command in force: the last one that passed."""
+        return self._command
+
+    @property
+    def status(self) -> GuardStatus:
+        """How things are now."""
+        with self._lock:
+            held = self._clock() - self._passed if self._condition is Condition.LIVE else 0.0
+            return GuardStatus(
+                self._condition,
+                self._accepted,
+                dict(self._refused),
+                self._refusing,
+                held,
+                self._lean,
+                self._alarms,
+                self._problem,
+            )
+
+    def connect(self) -> None:
+        """Connect the driver; commands then pass from where the robot is measured to stand.
+
+        Raises DriverError after a fall or an emergency stop that nobody has reset, and what the driver raises.
+        """
+        with self._lock:
+            if self._condition in (Condition.FALLING, Condition.FALLEN, Condition.EMERGENCY):
+                raise DriverError(f"{self._condition.value}: put the robot on its feet, then reset and connect again")
+            self._latch, self._ended = FallLatch(self._settings.fall), threading.Lock()
+            self._command, self._problem, self._refusing = None, "", ()
+            self._condition = Condition.CONNECTING
+            try:
+                self.__driver.connect()
+                self._begin(self.__driver.read())
+            except BaseException:
+                self._end(Condition.STOPPED)
+                raise
+            if self._condition is not Condition.CONNECTING:
+                self._try(self.__driver.stop)  # again: the driver may have gone on after the first
+                raise DriverError(f"{self._condition.value} while the robot was being connected")
+            self._condition = Condition.LIVE
+
+    def _begin(self, state: RobotState) -> None:
+        """Start gate and latch where the robot is."""
+        self._gate_state = self._gate.begin(state.q)
+        self._sensed, self._alarmed = state.time, 0.0
+        self._passed = self._checked = self._clock()
+
+    def read(self) -> RobotState:
+        """The robot's newest state, once the fall latch has seen it.
+
+        A driver that fails here ends the motion: a robot that cannot be watched is let go of. Its error is raised.
+        """
+        try:
+            state = self.__driver.read()
+        except NaoimitateError as error:
+            self._problem = str(error)
+            self._end(Condition.STOPPED)
+            raise
+        with self._lock:
+            self._watch(state)
+        return state
+
+    def write(self, command: RobotCommand) -> None:
+        """Let a command pass, or hold the last one: ``status`` says which and why."""
+        with self._lock:
+            if self._condition in (Condition.LIVE, Condition.FALLING):
+                self.read()
+            if self._condition is not Condition.LIVE:
+                self._refuse((NOT_LIVE,))
+                return
+            now = self._clock()
+            verdict = self._gate.check(self._gate_state, command, now - self._checked)
+            self._checked, self._gate_state = now, verdict.state
+            if verdict.accepted is None:
+                self._refuse(tuple(refusal.value for refusal in verdict.refusals))
+                return
+            if self._condition is Condition.LIVE:  # an emergency stop may have come in between
+                self._command, self._passed, self._refusing = command, now, ()
+                self._accepted += 1
+                self.__driver.write(verdict.accepted)
+
+    def soften(self, share: float) -> None:
+        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value; ignored unless live."""
+        if self._condition is Condition.LIVE:
+            self.__driver.soften(min(max(share, 0.0), 1.0))
+
+    def stop(self) -> None:
+        """End the motion safely and let go of the robot; may be called twice."""
+        self._end(Condition.STOPPED)
+
+    def emergency_stop(self) -> None:
+        """No further command passes; the servos become softer; the driver lets go of the robot. May be called twice.
+
+        The last command that passed is a stable pose, so the robot stands while it is let go of. Nothing here waits for
+        a lock: whoever holds one may be the one that is interrupted.
+        """
+        self._end(Condition.EMERGENCY, self._settings.emergency_stiffness)
+
+    def reset(self) -> None:
+        """A person has looked at the robot and says that it may be connected again."""
+        with self._lock:
+            if self._condition is Condition.FALLING:
+                raise DriverError("the robot is falling: wait until it lies, put it on its feet, then reset")
+            self._latch.reset()
+            if self._condition in (Condition.FALLEN, Condition.EMERGENCY):
+                self._condition = Condition.STOPPED
+
+    def _refuse(self, reasons: tuple[str, ...]) -> None:
+        self._refusing = reasons
+        self._refused.update(reasons)
+
+    def _watch(self, state: RobotState) -> None:
+        """Fall latch and alarms, once per new reading."""
+        dt = state.time - self._sensed
+        if self._condition not in (Condition.LIVE, Condition.FALLING) or dt <= 0.0:
+            return
+        self._sensed, self._alarms = state.time, state.alarms
+        self._lean = lean(UPRIGHT if self._command is None else self._command.base_quat, state.angles)
+        action = self._latch.sense(self._lean, _turning(state.gyro), state.fell, dt)
+        if action is Action.SOFTEN:
+            self._condition = Condition.FALLING
+            self._try(lambda: self.__driver.soften(self._settings.fall_stiffness))
+        elif action is Action.STOP:
+            self._end(Condition.FALLEN)
+        self._alarmed = self._alarmed + dt if state.alarms else 0.0
+        if self._settings.stop_on_alarm and self._alarmed >= self._settings.alarm_patience:
+            self._problem = self._problem or "; ".join(state.alarms)
+            self._end(Condition.STOPPED)
+
+    def _end(self, condition: Condition, stiffness: float | None = None) -> None:
+        """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does."""
+        if self._condition is Condition.OFF or not self._ended.acquire(blocking=False):
+            self._condition = condition if condition is Condition.EMERGENCY else self._condition
+            return
+        fell = self._condition is Condition.FALLING
+        self._condition = Condition.FALLEN if fell and condition is not Condition.EMERGENCY else condition
+        if stiffness is not None and not fell:
+            self._try(lambda: self.__driver.soften(stiffness))
+        self._try(self.__driver.stop)
+
+    def _try(self, do: Callable[[], None]) -> None:
+        """Do what must not stop the rest from being done."""
+        try:
+            do()
+        except Exception as error:  # a driver may fail in any way; the end goes on
+            self._problem = str(error) or type(error).__name__
+
+
+def _turning(gyro: Array) -> float:
+    """Speed (rad/s) of the torso about horizontal axes."""
+    return math.hypot(float(gyro[0]), float(gyro[1]))

@@ -1,0 +1,26 @@
+"""How far a torso leans away from its plan, whatever its heading: told from the direction of gravity alone."""
+
+from __future__ import annotations
+
+import math
+
+from naoimitate.core.frames import Array
+
+
+def up_from_quat(quat: Array) -> tuple[float, float, float]:
+    """World z in the frame of a torso with orientation (4,) (w, x, y, z): the last row of its rotation matrix."""
+    w, x, y, z = (float(v) for v in quat)
+    return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
+
+
+def up_from_angles(angles: Array) -> tuple[float, float, float]:
+    """The same from roll and pitch (2,) rad: (-sin p, cos p sin r, cos p cos r)."""
+    roll, pitch = float(angles[0]), float(angles[1])
+    return -math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)
+
+
+def lean(planned_quat: Array, angles: Array) -> float:
+    """Angle in rad between where up is planned to be and where it is measured; NaN where angles are."""
+    planned, measured = up_from_quat(planned_quat), up_from_angles(angles)
+    cosine = sum(a * b for a, b in zip(planned, measured, strict=True))
+    return math.acos(min(max(cosine, -1.0), 1.0)) if cosine == cosine else math.nan

@@ -1,0 +1,219 @@
+"""``naoimitate live``: a robot follows a stream of motion capture."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from naoimitate.cli import types
+
+if TYPE_CHECKING:
+    from naoimitate.hw.driver import Driver
+    from naoimitate.live.loop import Beat
+    from naoimitate.live.session import Session
+    from naoimitate.robot.model import RobotModel
+    from naoimitate.run.journal import Journal
+
+DRIVERS = ("mujoco", "none")
+
+
+@click.command()
+@click.option("--source", required=True, metavar="PROTOCOL", help="xsens, vmc, rokoko, json or replay:FILE.")
+@click.option("--bind", default="127.0.0.1", show_default=True, help="Address of this machine to listen on.")
+@click.option("--port", type=click.IntRange(0, 65535), help="UDP port [default: the protocol's own; 0: any].")
+@click.option("--allow", metavar="ADDRESS", help="Listen to this sender only [default: the first that comes].")
+@click.option("--driver", type=click.Choice(DRIVERS), required=True, help="The robot to command.")
+@click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
+@click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
+@click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
+@click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
+@click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
+@click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
+@click.option("--duration", type=types.SECONDS, help="End after so many seconds.")
+@click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the raw stream to this file.")
+@click.option("--out", type=types.RUN_FILE, help="Run file to write.")
+def live(**options: Any) -> None:
+    """Let a robot follow a person whose motion capture comes over the network.
+
+    Stand in a T-pose and hold it until the robot begins to follow. Ctrl-C ends the session safely.
+    """
+    from naoimitate.calib.subject import load_subject
+    from naoimitate.command_gate import CommandGate
+    from naoimitate.hw.guarded import GuardedDriver
+    from naoimitate.live.session import Session, SessionSettings
+    from naoimitate.robot import load_robot
+
+    robot = load_robot(options["robot"], options["robot_version"])
+    subject = load_subject(options["subject"]) if options["subject"] else None
+    choices = SessionSettings(filtered=not options["no_filter"], mirror=options["mirror"])
+    session = Session(robot, _settings(options["speed_limit"]), choices, subject)
+    driver = GuardedDriver(_driver(options["driver"], robot), CommandGate(robot))
+    if options["source"].startswith("replay:"):
+        _replay(Path(options["source"][len("replay:") :]), session, driver, robot, options)
+    else:
+        _listen(session, driver, robot, options)
+
+
+def _settings(share: float) -> Any:
+    """The usual settings, slower."""
+    from dataclasses import replace
+
+    from naoimitate.settings import Settings
+
+    usual = Settings()
+    limits = usual.limits
+    slower = replace(
+        limits,
+        hand_speed=share * limits.hand_speed,
+        foot_speed=share * limits.foot_speed,
+        head_speed=share * limits.head_speed,
+        joint_share=share * limits.joint_share,
+    )
+    return replace(usual, limits=slower)
+
+
+def _driver(name: str, robot: RobotModel) -> Driver:
+    if name == "none":
+        from naoimitate.hw.none import NoDriver
+
+        return NoDriver(robot)
+    from naoimitate.sim.driver import MujocoDriver
+
+    return MujocoDriver(robot)
+
+
+def _listen(session: Session, driver: Driver, robot: RobotModel, options: dict[str, Any]) -> None:
+    """The session with a stream from the network."""
+    from naoimitate.core.errors import StreamError
+    from naoimitate.live.loop import Loop
+    from naoimitate.live.protocols.registry import PROTOCOLS
+    from naoimitate.live.receiver import Receiver
+    from naoimitate.live.recording import Recorder
+    from naoimitate.live.stream import Stream
+
+    protocol = PROTOCOLS.get(options["source"])
+    if protocol is None:
+        raise StreamError(f"no source {options['source']}: there are {', '.join(PROTOCOLS)} and replay:FILE")
+    port = protocol.port if options["port"] is None else options["port"]
+    receiver = Receiver(options["bind"], port)
+    stream = Stream(protocol, tuple(PROTOCOLS.values()), options["allow"])
+    writer = Writer(options["out"], session, robot, f"live:{protocol.name}")
+    loop = Loop(session, stream, receiver, driver, [writer.take])
+    recorder = None
+    if options["record"] is not None:
+        recorder = Recorder(options["record"], {"protocol": protocol.name, "robot": robot.name, **_texts(options)})
+        loop.record = recorder.datagram
+        loop.watch.append(lambda beat: recorder.step(beat.now))
+    try:
+        session.warm_up()
+        driver.connect()
+        click.echo(f"ready: listening for {protocol.title} on {options['bind']} port {receiver.port}")
+        loop.run(math.inf if options["duration"] is None else options["duration"])
+    except KeyboardInterrupt:
+        click.echo("ended by the operator", err=True)
+    finally:
+        driver.stop()
+        receiver.close()
+        if recorder is not None:
+            recorder.close()
+        for line in (*writer.close(), _summary(stream)):
+            click.echo(line)
+
+
+def _replay(path: Path, session: Session, driver: Driver, robot: RobotModel, options: dict[str, Any]) -> None:
+    """A recorded session again, with the times and the commands of then."""
+    import time
+
+    from naoimitate.core.errors import StreamError
+    from naoimitate.live.loop import Beat
+    from naoimitate.live.protocols.registry import PROTOCOLS
+    from naoimitate.live.recording import play, read_recording
+    from naoimitate.live.stream import Stream
+
+    recording = read_recording(path)
+    protocol = PROTOCOLS.get(str(recording.header.get("protocol")))
+    if protocol is None:
+        raise StreamError(f"{path} holds a stream of {recording.header.get('protocol')}, which is not known here")
+    stream = Stream(protocol, tuple(PROTOCOLS.values()), options["allow"])
+    writer = Writer(options["out"], session, robot, f"replay:{path.name}")
+    try:
+        session.warm_up()
+        driver.connect()
+        click.echo(f"ready: playing {path}")
+        begin, first = time.monotonic(), None
+        for now, tick in play(recording, session, stream):
+            first = now if first is None else first
+            if options["duration"] is not None and now - first > options["duration"]:
+                break
+            time.sleep(max(0.0, begin + now - first - time.monotonic()))
+            driver.write(tick.command)
+            writer.take(Beat(tick, now, math.nan, 0.0))
+    except KeyboardInterrupt:
+        click.echo("ended by the operator", err=True)
+    finally:
+        driver.stop()
+        for line in (*writer.close(), _summary(stream)):
+            click.echo(line)
+
+
+def _texts(options: dict[str, Any]) -> dict[str, str]:
+    return {"options": ", ".join(f"{key}={value}" for key, value in sorted(options.items()) if value is not None)}
+
+
+def _summary(stream: Any) -> str:
+    c = stream.counts
+    return (
+        f"{c.datagrams} datagrams, {c.frames} frames used in order, {c.late} late, {c.lost} lost, {c.damaged} damaged, "
+        f"{c.foreign} of other senders"
+    )
+
+
+class Writer:
+    """The run files of a session: a new one with every calibration."""
+
+    def __init__(self, out: Path | None, session: Session, robot: RobotModel, source: str) -> None:
+        self._out, self._session, self._robot, self._source = out, session, robot, source
+        self._journal: Journal | None = None
+        self._begin: float | None = None
+        self._written: list[str] = []
+        self._count = 0
+
+    def take(self, beat: Beat) -> None:
+        """One turn of the loop."""
+        if self._out is None:
+            return
+        self._begin = beat.now if self._begin is None else self._begin
+        if beat.tick.began or (self._journal is None and beat.tick.fresh):
+            self._next()
+        if self._journal is not None:
+            tick = beat.tick
+            self._journal.add(tick.command, tick.arrival - self._begin, tick.state.value, beat.latency, beat.step_time)
+
+    def close(self) -> list[str]:
+        """Finish the last run file; a line for each."""
+        self._finish()
+        return self._written
+
+    def _next(self) -> None:
+        from naoimitate.run.columns import constants
+        from naoimitate.run.journal import Journal
+        from naoimitate.run.provenance import provenance
+
+        assert self._out is not None
+        self._finish()
+        self._count += 1
+        name = self._out.name if self._count == 1 else f"{self._out.stem}-{self._count}{self._out.suffix}"
+        imitator = self._session.imitator
+        text = provenance(imitator.settings, source_sha256="", seed=0, speed="live")
+        fixed = constants(self._robot, imitator.mapping, imitator.settings.retarget, self._source, text)
+        self._journal = Journal(self._out.with_name(name), fixed)
+
+    def _finish(self) -> None:
+        if self._journal is not None:
+            run = self._journal.close()
+            if run is not None:
+                self._written.append(f"{self._journal.out}: {len(run)} frames, {run.duration:.2f} s")
+            self._journal = None

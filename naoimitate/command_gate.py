@@ -1,0 +1,240 @@
+"""The gate between a method and a driver: no command reaches a robot that is impossible, too fast or would tip it.
+
+Nothing that a command says about itself is believed: balance and feet are computed again from its joints and torso. The
+gate is a pure function with the state that it needs; a refused command means that the last accepted one is held, which
+is safe, since it passed.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from naoimitate.balance.legs import LegLimits, Legs, build_legs
+from naoimitate.core.frames import Array, RobotCommand
+from naoimitate.core.geometry import matrix_from_quat
+from naoimitate.gate import GateModel, build_gate, outline_travel, range_excess, speed_ratio, support_margin
+from naoimitate.robot.kernel import center_of_mass, forward
+from naoimitate.robot.model import RobotModel, Tree
+
+CARRIES = {"D": (True, True), "L": (True, False), "R": (False, True)}
+"""Which feet, left and right, carry the robot in each support."""
+
+
+class Refusal(enum.Enum):
+    """Why a command was refused; the value is a word for people."""
+
+    MALFORMED = "malformed"
+    """A number is missing or not finite, the quaternion is not of unit length, the support is unknown."""
+    ORDER = "order of time"
+    """Its time does not follow the last accepted one's, or runs ahead of the real clock."""
+    RANGE = "joint range"
+    """A joint or hand is out of range, of a coupling table, or apart from its coupled partner."""
+    SPEED = "joint speed"
+    ACCELERATION = "acceleration"
+    """A joint turns round at speed. Stopping at once is allowed."""
+    MARGIN = "balance"
+    """The centre of mass is too near the edge of the stance feet, or outside."""
+    FLOOR = "feet on the floor"
+    """A stance sole is off the floor or tilted, or a sole under it."""
+    SLIP = "feet that slide"
+    """Both feet carried, carry, and move against each other."""
+
+
+@dataclass(frozen=True)
+class CommandLimits:
+    """What a command must keep to reach a robot: the bars of the scores, a little wider than what the method plans."""
+
+    margin: float = 0.005
+    """[m] of the CoM's ground projection inside the stance outlines."""
+    height: float = 5e-4
+    """[m] of a stance sole's outline over or under the floor, and of any sole under it."""
+    slip: float = 5e-4
+    """[m] by which feet that both carry may have moved against each other since they were set down."""
+    speed_share: float = 0.9
+    """Share of the motors' no-load speed."""
+    change_share: float = 0.9
+    """Share of the no-load speed by which a joint's speed may change from one command to the next: from full speed it
+    may stop, but not turn round. It is a step and no acceleration: where a foot has to stay, the method ends a movement
+    of the legs within a frame, whatever the frame rate. What it plans otherwise is smooth (``TaskLimits``)."""
+    range_tolerance: float = 1e-9
+    """[rad] beyond a joint's range: rounding."""
+    coupled: float = 1e-6
+    """[rad] between joints that one motor moves."""
+    unit: float = 1e-6
+    """By which a quaternion's length may differ from 1."""
+    max_dt: float = 0.05
+    """[s] of elapsed time that a single step may use up, however long the last accepted command is held."""
+    clock_lead: float = 0.1
+    """[s] of time to move in that may be given out before it has passed: a burst after a pause of the computer."""
+
+
+class Feet(NamedTuple):
+    """What a pose does to the floor, computed from joints and torso; soles in the world: left, right.
+
+    margin: m, of the CoM inside the stance outlines. off: m, largest distance of a stance outline point from the floor.
+    under: m, deepest sole point under the floor. pos: (2, 3) m and rot: (2, 3, 3), the soles.
+    """
+
+    margin: float
+    off: float
+    under: float
+    pos: Array
+    rot: Array
+
+
+@dataclass(frozen=True)
+class GateState:
+    """What the gate remembers. Make the first one with ``CommandGate.begin``.
+
+    q: (J,) rad, where the robot is told to be. velocity: (J,) rad/s of the last accepted step, 0 after a refusal.
+    time: s, of the last accepted command; -inf before the first. held: s of real time since it was accepted. lead: s by
+    which the clock of the commands has run ahead of the real one. planted: the soles (2, 3) m, (2, 3, 3) as they were
+    when both carried for the first time since one did not; None while one does not. accepted: the command in force.
+    """
+
+    q: Array
+    velocity: Array
+    time: float = -math.inf
+    held: float = 0.0
+    lead: float = 0.0
+    planted: tuple[Array, Array] | None = None
+    accepted: RobotCommand | None = None
+
+
+class Verdict(NamedTuple):
+    """The state after a command, the command if it was accepted, and else why not."""
+
+    state: GateState
+    accepted: RobotCommand | None
+    refusals: tuple[Refusal, ...]
+
+
+class CommandGate:
+    """The limits of one robot, compiled once; ``check`` is pure."""
+
+    def __init__(self, robot: RobotModel, limits: CommandLimits | None = None) -> None:
+        self.limits = limits or CommandLimits()
+        self._model, self._legs, self._tree = build_gate(robot), build_legs(robot, LegLimits()), robot.tree
+        self._coupled = robot.coupled
+        stand = robot.postures["stand"]
+        self.feet(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles, so that no command waits for it
+        _motion(self._model, stand, stand, np.zeros_like(stand), 1.0)
+
+    def begin(self, q: Array) -> GateState:
+        """The state of a robot that stands still at q (J,) rad, as it was measured."""
+        return GateState(q=np.array(q, dtype=np.float64), velocity=np.zeros(len(q)))
+
+    def check(self, state: GateState, command: RobotCommand, dt: float) -> Verdict:
+        """Whether a command may follow the last accepted one; dt: s of real time since the last check.
+
+        Speeds are taken over the commands' own time, at most ``max_dt``, and that time may not outrun the real one:
+        a command is neither refused because the computer was late with the one before nor accepted because it says so.
+        """
+        dt = max(dt, 0.0) if math.isfinite(dt) else 0.0
+        state = replace(state, held=state.held + dt)
+        if not self._well_formed(command, len(state.q)):
+            return self._refused(state, [Refusal.MALFORMED])
+        elapsed = command.time - state.time if math.isfinite(state.time) else self.limits.max_dt
+        lead = max(0.0, state.lead + min(elapsed, self.limits.max_dt) - state.held) if state.accepted else 0.0
+        if elapsed <= 0.0 or lead > self.limits.clock_lead:
+            return self._refused(state, [Refusal.ORDER])
+        elapsed = min(elapsed, self.limits.max_dt)
+        refusals = [] if self._in_range(command) else [Refusal.RANGE]
+        refusals += self._too_sudden(state, command.q, elapsed)
+        feet = self.feet(command.q, command.base_pos, command.base_quat, command.support)
+        refusals += self._unstable(state, feet, command.support)
+        if refusals:
+            return self._refused(state, refusals)
+        return Verdict(self._after(state, command, feet, elapsed, lead), command, ())
+
+    def feet(self, q: Array, base_pos: Array, base_quat: Array, support: str) -> Feet:
+        """Balance and feet of a pose: q (J,) rad, torso (3,) m, (4,) in the world, on the feet of ``support``."""
+        return Feet(*_feet(self._tree, self._legs, q, base_pos, base_quat, *CARRIES[support]))
+
+    def _well_formed(self, command: RobotCommand, joints: int) -> bool:
+        numbers = (command.q, (joints,)), (command.base_pos, (3,)), (command.base_quat, (4,))
+        if command.support not in CARRIES or not math.isfinite(command.time):
+            return False
+        if not all(isinstance(v, np.ndarray) and v.shape == shape and np.isfinite(v).all() for v, shape in numbers):
+            return False
+        return abs(math.sqrt(command.base_quat @ command.base_quat) - 1.0) <= self.limits.unit
+
+    def _in_range(self, command: RobotCommand) -> bool:
+        if range_excess(self._model, command.q) > self.limits.range_tolerance:
+            return False
+        if any(abs(command.q[a] - command.q[b]) > self.limits.coupled for a, b in self._coupled):
+            return False
+        return command.hand_opening is None or not any(not 0.0 <= x <= 1.0 for x in command.hand_opening if x == x)
+
+    def _too_sudden(self, state: GateState, q: Array, elapsed: float) -> list[Refusal]:
+        limits = self.limits
+        speed, change = _motion(self._model, q, state.q, state.velocity, elapsed)
+        refusals = [Refusal.SPEED] if speed > limits.speed_share else []
+        return [*refusals, Refusal.ACCELERATION] if change > limits.change_share else refusals
+
+    def _unstable(self, state: GateState, feet: Feet, support: str) -> list[Refusal]:
+        limits = self.limits
+        refusals = [Refusal.MARGIN] if feet.margin < limits.margin else []
+        if feet.off > limits.height or feet.under > limits.height:
+            refusals.append(Refusal.FLOOR)
+        if support == "D" and state.planted is not None and _slip(self._legs, *state.planted, feet) > limits.slip:
+            refusals.append(Refusal.SLIP)
+        return refusals
+
+    def _refused(self, state: GateState, refusals: list[Refusal]) -> Verdict:
+        return Verdict(replace(state, velocity=np.zeros_like(state.q)), None, tuple(refusals))
+
+    def _after(self, state: GateState, command: RobotCommand, feet: Feet, elapsed: float, lead: float) -> GateState:
+        planted = (state.planted or (feet.pos, feet.rot)) if command.support == "D" else None
+        first = state.accepted is None  # from where the robot was measured, which is no step of a movement
+        velocity = np.zeros_like(state.q) if first else (command.q - state.q) / elapsed
+        return GateState(command.q.copy(), velocity, command.time, 0.0, lead, planted, command)
+
+
+@njit(cache=True)
+def _motion(model: GateModel, q: Array, before: Array, velocity: Array, dt: float) -> tuple[float, float]:
+    """Speed and change of speed of the worst joint, as shares of the no-load speed."""
+    change = 0.0
+    for j in range(q.shape[0]):
+        change = max(change, abs((q[j] - before[j]) / dt - velocity[j]) / model.speed[j])
+    return speed_ratio(model, q, before, dt), change
+
+
+@njit(cache=True)
+def _feet(
+    tree: Tree, legs: Legs, q: Array, base_pos: Array, base_quat: Array, left: bool, right: bool
+) -> tuple[float, float, float, Array, Array]:
+    """The fields of ``Feet``."""
+    n = q.shape[0]
+    link_pos, link_rot = np.empty((n + 1, 3)), np.empty((n + 1, 3, 3))
+    forward(tree, q, link_pos, link_rot)
+    com = np.empty(3)
+    center_of_mass(tree, link_pos, link_rot, com)
+    R = matrix_from_quat(base_quat)
+    pos, rot = np.empty((2, 3)), np.empty((2, 3, 3))
+    off, under = 0.0, 0.0
+    for side in range(2):
+        row = legs.sole_joint[side] + 1
+        pos[side] = base_pos + R @ (link_pos[row] + link_rot[row] @ legs.sole_point[side])
+        rot[side] = R @ link_rot[row]
+        for k in range(legs.outline.shape[1]):
+            x, y = legs.outline[side, k]
+            z = pos[side, 2] + rot[side, 2, 0] * x + rot[side, 2, 1] * y
+            under = max(under, -z)
+            if (side == 0 and left) or (side == 1 and right):
+                off = max(off, abs(z))
+    return support_margin(legs, pos, rot, left, right, base_pos + R @ com), off, under, pos, rot
+
+
+@njit(cache=True)
+def _slip(legs: Legs, pos: Array, rot: Array, feet: Feet) -> float:
+    """How far (m) an outline point of the right sole has moved, seen from the left sole."""
+    was = rot[0].T @ (pos[1] - pos[0]), rot[0].T @ rot[1]
+    now = feet.rot[0].T @ (feet.pos[1] - feet.pos[0]), feet.rot[0].T @ feet.rot[1]
+    return outline_travel(legs, 1, was[0], was[1], now[0], now[1])
