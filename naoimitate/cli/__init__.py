@@ -15,6 +15,7 @@ from naoimitate.cli.calibrate import calibrate
 from naoimitate.cli.check import check
 from naoimitate.cli.demo import demo
 from naoimitate.cli.imitate import imitate
+from naoimitate.cli.live import live
 from naoimitate.cli.motions import motions
 from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
@@ -36,7 +37,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (demo, imitate, score, check, calibrate, motions, robots, reproduce):
+for _command in (demo, imitate, live, score, check, calibrate, motions, robots, reproduce):
     cli.add_command(_command)
 
 
