@@ -1,0 +1,356 @@
+"""A guarded driver: nothing unsafe passes, falls and alarms are seen, and it always ends let go of."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from dataclasses import fields, replace
+from itertools import count
+from typing import Any
+
+import numpy as np
+import pytest
+
+from naoimitate import load_robot
+from naoimitate.command_gate import CommandGate, Refusal
+from naoimitate.core.errors import DriverError
+from naoimitate.core.frames import RobotCommand
+from naoimitate.fsm.fall_latch import FallLimits
+from naoimitate.hw.driver import Driver, RobotState
+from naoimitate.hw.guarded import NOT_LIVE, Condition, GuardedDriver, GuardSettings
+from naoimitate.hw.lean import lean, up_from_angles, up_from_quat
+from naoimitate.hw.none import NoDriver, one_line
+from naoimitate.sim.driver import MujocoDriver
+from naoimitate.sim.placement import stand_on_floor
+from naoimitate.sim.sensors import roll_pitch
+
+NAO = load_robot("nao", "v4")
+GATE = CommandGate(NAO)
+STAND = NAO.postures["stand"]
+DT, UP = 0.02, np.array([0.0, 0.0, 1.0])
+NAN = np.full(24, np.nan)
+
+
+class FakeRobot:
+    """A driver that writes down what is done to it. Every reading takes a period; its time is the clock of a test."""
+
+    period = DT
+
+    def __init__(self) -> None:
+        self.done: list[object] = []
+        self.angles = np.zeros(2)
+        self.fell, self.alarms, self.time = False, (), 0.0
+        self.alarms: tuple[str, ...]
+        self.breaks: set[str] = set()
+
+    def connect(self) -> None:
+        self._do("connect")
+
+    def read(self) -> RobotState:
+        if "read" in self.breaks:
+            raise DriverError("the robot does not answer")
+        self.time += DT
+        gyro = np.zeros(3)
+        state = (self.time, STAND, NAN, self.angles, gyro, np.zeros(3), np.zeros((2, 4)), self.fell)
+        return RobotState(*state, alarms=self.alarms)
+
+    def write(self, command: RobotCommand) -> None:
+        self._do(command)
+
+    def soften(self, share: float) -> None:
+        self._do(("soften", share))
+
+    def stop(self) -> None:
+        self._do("stop")
+
+    def _do(self, what: object) -> None:
+        self.done.append(what)
+        if str(what if isinstance(what, str) else what[0] if isinstance(what, tuple) else "write") in self.breaks:
+            raise RuntimeError("broken")
+
+
+def command(moment: float, *, head: float = 0.0, lift: float = 0.0) -> RobotCommand:
+    """A stand at a time, with the head turned by rad, lifted off the floor by m."""
+    q = STAND.copy()
+    q[NAO.joint("HeadYaw")] = head
+    pos, quat = stand_on_floor(NAO, q)
+    empty: dict[str, Any] = {field.name: None for field in fields(RobotCommand)}
+    pose = {"time": moment, "q": q, "base_pos": pos + lift * UP, "base_quat": quat, "support": "D"}
+    return RobotCommand(**{**empty, **pose})
+
+
+def guarded(settings: GuardSettings | None = None) -> tuple[GuardedDriver, FakeRobot]:
+    robot = FakeRobot()
+    guard = GuardedDriver(robot, GATE, settings, clock=lambda: robot.time)
+    guard.connect()
+    return guard, robot
+
+
+def test_it_is_a_driver_itself() -> None:
+    guard, robot = guarded()
+    assert isinstance(robot, Driver)
+    assert isinstance(guard, Driver)
+    assert guard.period == robot.period
+
+
+def test_the_driver_behind_it_cannot_be_reached() -> None:
+    guard, robot = guarded()
+    for name in dir(guard):
+        if not name.startswith("_"):
+            assert getattr(guard, name) is not robot
+
+
+def test_good_commands_pass_and_bad_ones_are_held_counted_and_named() -> None:
+    guard, robot = guarded()
+    good = command(0.02, head=0.01)
+    guard.write(good)
+    guard.write(command(0.04, lift=0.01))
+    assert guard.status.refusing == (Refusal.FLOOR.value,)
+    guard.write(command(0.06, head=2.0))
+    guard.write(command(0.02))
+    assert [done for done in robot.done if isinstance(done, RobotCommand)] == [good]
+    assert guard.command is good, "held"
+    status = guard.status
+    assert status.accepted == 1
+    assert status.refused == {"feet on the floor": 1, "joint speed": 1, "acceleration": 1, "order of time": 1}
+    guard.write(command(0.08))
+    assert guard.status.refusing == ()
+    assert guard.status.accepted == 2
+
+
+def test_the_first_command_must_be_near_where_the_robot_is_measured() -> None:
+    guard, _ = guarded()
+    guard.write(command(0.0, head=1.5))
+    assert guard.status.refusing[0] == Refusal.SPEED.value
+    assert guard.command is None
+    guard.write(command(0.02, head=0.05))
+    assert guard.command is not None
+
+
+def test_nothing_passes_before_connect_or_after_the_end() -> None:
+    robot = FakeRobot()
+    guard = GuardedDriver(robot, GATE)
+    guard.write(command(0.0))
+    assert robot.done == []
+    for end in (GuardedDriver.stop, GuardedDriver.emergency_stop):
+        guard, robot = guarded()
+        guard.write(command(0.0))
+        end(guard)
+        done = len(robot.done)
+        guard.write(command(0.02))
+        guard.soften(1.0)
+        assert len(robot.done) == done
+        assert guard.status.refused == {NOT_LIVE: 1}
+
+
+def test_an_emergency_stop_softens_then_stops_once_and_stays_until_reset() -> None:
+    guard, robot = guarded()
+    for _ in range(3):
+        guard.emergency_stop()
+    guard.stop()
+    assert robot.done == ["connect", ("soften", GuardSettings().emergency_stiffness), "stop"]
+    assert guard.status.condition is Condition.EMERGENCY
+    with pytest.raises(DriverError, match="reset"):
+        guard.connect()
+    guard.reset()
+    guard.connect()
+    guard.write(command(0.0))
+    assert guard.status.condition is Condition.LIVE
+    assert guard.command is not None
+
+
+@pytest.mark.parametrize("breaks", [{"soften"}, {"stop"}, {"soften", "stop"}])
+def test_an_emergency_stop_ends_defined_whatever_the_driver_does(breaks: set[str]) -> None:
+    guard, robot = guarded()
+    robot.breaks = breaks
+    guard.emergency_stop()
+    assert guard.status.condition is Condition.EMERGENCY
+    assert robot.done[-1] == "stop"
+    assert guard.status.problem == "broken"
+
+
+def test_an_emergency_stop_from_many_threads_during_writes_is_one() -> None:
+    guard, robot = guarded()
+    go, running = threading.Event(), True
+
+    def writes() -> None:
+        moment = 0.0
+        while running:
+            moment += 0.001
+            guard.write(command(moment))
+
+    def stops() -> None:
+        go.wait()
+        guard.emergency_stop()
+
+    threads = [threading.Thread(target=stops) for _ in range(8)]
+    writer = threading.Thread(target=writes)
+    for thread in (*threads, writer):
+        thread.start()
+    time.sleep(0.1)
+    go.set()
+    for thread in threads:
+        thread.join(2.0)
+        assert not thread.is_alive()
+    done = len([d for d in robot.done if isinstance(d, RobotCommand)])
+    time.sleep(0.05)
+    running = False
+    writer.join(2.0)
+    assert robot.done.count("stop") == 1
+    assert len([d for d in robot.done if isinstance(d, RobotCommand)]) <= done + 1, "but for one on its way"
+    assert guard.status.condition is Condition.EMERGENCY
+
+
+def test_an_emergency_stop_from_a_signal_never_waits_for_what_it_interrupts() -> None:
+    """The signal comes while the same thread is inside the driver, with the guard's lock held."""
+    guard, robot = guarded()
+    before = signal.signal(signal.SIGUSR1, lambda *_: guard.emergency_stop())
+    try:
+        robot.write = lambda c: os.kill(os.getpid(), signal.SIGUSR1)  # type: ignore[method-assign]
+        guard.write(command(0.0))
+        assert guard.status.condition is Condition.EMERGENCY
+        assert robot.done[-1] == "stop"
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+
+
+def test_an_emergency_stop_while_the_robot_is_being_connected_counts() -> None:
+    robot = FakeRobot()
+    guard = GuardedDriver(robot, GATE)
+    robot.connect = guard.emergency_stop  # type: ignore[method-assign]
+    with pytest.raises(DriverError, match="emergency stop"):
+        guard.connect()
+    assert robot.done[-1] == "stop"
+    assert guard.status.condition is Condition.EMERGENCY
+
+
+def test_a_driver_that_cannot_connect_is_stopped_and_its_error_raised() -> None:
+    robot = FakeRobot()
+    robot.breaks = {"connect"}
+    guard = GuardedDriver(robot, GATE)
+    with pytest.raises(RuntimeError):
+        guard.connect()
+    assert guard.status.condition is Condition.STOPPED
+    assert robot.done == ["connect", "stop"]
+
+
+def test_a_robot_that_leans_is_softened_then_let_go_of_and_latched() -> None:
+    guard, robot = guarded()
+    guard.write(command(0.0))
+    robot.angles = np.array([0.0, 0.6])
+    for i in range(1, 120):
+        guard.write(command(i * DT))
+    assert robot.done[-2:] == [("soften", GuardSettings().fall_stiffness), "stop"]
+    assert guard.status.condition is Condition.FALLEN
+    assert guard.status.lean == pytest.approx(0.6)
+    passed = [d for d in robot.done if isinstance(d, RobotCommand)]
+    assert len(passed) <= 1 + FallLimits().patience / DT + 1
+    robot.angles = np.zeros(2)
+    guard.read()
+    assert guard.status.condition is Condition.FALLEN, "latched"
+    with pytest.raises(DriverError, match="fallen"):
+        guard.connect()
+    guard.reset()
+    guard.connect()
+    assert guard.status.condition is Condition.LIVE
+
+
+def test_a_robot_that_bows_as_it_is_told_does_not_fall() -> None:
+    guard, robot = guarded()
+    bowed = command(0.0)
+    half = 0.25
+    guard._command = replace(bowed, base_quat=np.array([np.cos(half), 0.0, np.sin(half), 0.0]))
+    robot.angles = np.array([0.0, 2.0 * half])
+    for _ in range(50):
+        guard.read()
+    assert guard.status.condition is Condition.LIVE
+    assert guard.status.lean == pytest.approx(0.0, abs=1e-6)
+
+
+def test_lean_does_not_depend_on_the_heading() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        quat = rng.normal(size=4)
+        quat /= np.linalg.norm(quat)
+        np.testing.assert_allclose(up_from_quat(quat), up_from_angles(roll_pitch(quat)), atol=1e-9)
+        assert lean(quat, roll_pitch(quat)) == pytest.approx(0.0, abs=1e-6)
+    assert np.isnan(lean(quat, np.full(2, np.nan)))
+
+
+def test_alarms_are_shown_and_stop_only_where_asked() -> None:
+    guard, robot = guarded()
+    robot.alarms = ("RKneePitch is hot",)
+    for i in range(100):
+        guard.write(command(i * DT))
+    assert guard.status.alarms == robot.alarms
+    assert guard.status.condition is Condition.LIVE
+    guard, robot = guarded(GuardSettings(stop_on_alarm=True))
+    robot.alarms = ("RKneePitch is hot",)
+    for i in range(25):
+        guard.write(command(i * DT))
+    assert guard.status.condition is Condition.LIVE, "not at once"
+    for i in range(25, 60):
+        guard.write(command(i * DT))
+    assert guard.status.condition is Condition.STOPPED
+    assert guard.status.problem == "RKneePitch is hot"
+    assert robot.done[-1] == "stop"
+
+
+def test_a_robot_that_cannot_be_watched_is_let_go_of() -> None:
+    guard, robot = guarded()
+    robot.breaks = {"read"}
+    with pytest.raises(DriverError, match="answer"):
+        guard.write(command(0.0))
+    assert robot.done == ["connect", "stop"]
+    assert guard.status.condition is Condition.STOPPED
+    assert guard.status.problem == "the robot does not answer"
+
+
+def test_a_fall_in_the_simulation_is_seen_before_the_robot_lies() -> None:
+    """The robot tips over its toes by its ankles, behind the guard's back."""
+    robot = MujocoDriver(NAO, real_time=False)
+    guard = GuardedDriver(robot, GATE)
+    guard.connect()
+    guard.write(command(0.0))
+    robot.advance(0.5)
+    q = STAND.copy()
+    q[[NAO.joint("LAnklePitch"), NAO.joint("RAnklePitch")]] -= 0.5
+    robot.write(replace(command(0.0), q=q))
+    for _ in range(200):
+        robot.advance(DT)
+        guard.read()
+        if guard.status.condition is not Condition.LIVE:
+            break
+    assert guard.status.condition is Condition.FALLING
+    assert guard.status.lean < np.radians(35.0)
+    for _ in range(200):
+        robot.advance(DT)
+        guard.read()
+    assert guard.status.condition is Condition.FALLEN
+
+
+def test_no_robot_is_where_it_is_told_to_be() -> None:
+    taken: list[RobotCommand] = []
+    ticks = count(0.0, DT)
+    guard = GuardedDriver(NoDriver(NAO, taken.append), GATE, clock=lambda: next(ticks))
+    guard.connect()
+    np.testing.assert_array_equal(guard.read().q, STAND)
+    for i in range(10):
+        guard.write(command(i * DT, head=0.01 * i))
+    state = guard.read()
+    np.testing.assert_array_equal(state.q, taken[-1].q)
+    assert len(taken) == 10
+    assert not state.fell
+    assert np.isnan(state.angles).all()
+    assert guard.status.condition is Condition.LIVE
+    guard.stop()
+    assert len(taken) == 10
+
+
+def test_no_robot_can_print() -> None:
+    line = one_line(replace(command(1.5, head=0.1), offset=0.25))
+    assert line.split()[:5] == ["1.500", "s", "D", "offset", "0.25"]
+    assert len(line.split()) == 5 + len(STAND)
+    assert float(line.split()[5 + NAO.joint("HeadYaw")]) == pytest.approx(5.7)
