@@ -37,6 +37,10 @@ SETTLE_STEP = 0.1
 """[rad] of each joint in one step of ``settle``."""
 
 
+ROUGHER = (0.0, 0.05, 0.2, 1.0)
+"""Shares of the way from smooth bounds to those of speed alone, tried in turn where the body is in the way."""
+
+
 class Arms:
     """Both arms and the head of a robot."""
 
@@ -109,10 +113,14 @@ class Arms:
     def _follow(
         self, limb: Limb, weights: LimbWeights, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
     ) -> tuple[int, float]:
-        """One frame of a limb, smooth where the body does not forbid it: (iterations, tip error m)."""
-        found = solve_limb(self._robot.tree, limb, weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
-        if found[0] == 0:
-            found = solve_limb(self._robot.tree, limb, weights, *task, q, reach.low, reach.high, *rows)
+        """One frame of a limb, as smooth as the body allows: (iterations, tip error m)."""
+        found = 0, 0.0
+        for share in ROUGHER:
+            low = reach.smooth_low + share * (reach.low - reach.smooth_low)
+            high = reach.smooth_high + share * (reach.high - reach.smooth_high)
+            found = solve_limb(self._robot.tree, limb, weights, *task, q, low, high, *rows)
+            if found[0] > 0:
+                break
         return found
 
     def _change(

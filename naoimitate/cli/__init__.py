@@ -17,6 +17,7 @@ from naoimitate.cli.demo import demo
 from naoimitate.cli.imitate import imitate
 from naoimitate.cli.live import live
 from naoimitate.cli.motions import motions
+from naoimitate.cli.recover import recover
 from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
 from naoimitate.cli.score import score
@@ -37,7 +38,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (demo, imitate, live, score, check, calibrate, motions, robots, reproduce):
+for _command in (demo, imitate, live, score, check, calibrate, motions, robots, recover, reproduce):
     cli.add_command(_command)
 
 

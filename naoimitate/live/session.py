@@ -84,6 +84,7 @@ class Session:
         self.reason = ""
         """Why the session is in fault."""
         self._person: HumanFrame | None = None
+        self._kept: HumanFrame | None = None
         self._fresh: HumanFrame | None = None
         self._arrival, self._now = -math.inf, math.nan
         self._played = ""
@@ -199,6 +200,8 @@ class Session:
             self._began = True
         if action in (Action.BLEND, Action.CALIBRATE):
             self._played = ""
+        if action is Action.HOLD:
+            self._kept = self._person
         return action
 
     def _imitate(self, now: float, fresh: bool, dt: float) -> RobotCommand:
@@ -221,7 +224,7 @@ class Session:
 
     def _expected(self, now: float, fresh: bool) -> HumanFrame:
         """The operator now: as seen, continued for a short while, or as last seen."""
-        person = self._person
+        person = self._kept if self.state in _KEPT else self._person
         assert person is not None
         if fresh or not self._live.filtered or self.state in _KEPT:
             return person

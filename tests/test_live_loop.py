@@ -1,0 +1,193 @@
+"""The live loop with real datagrams: every state by packets alone, recordings, journals, killed programs."""
+
+from __future__ import annotations
+
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from naoimitate.cli import run as command
+from naoimitate.core.errors import RunFileError, StreamError
+from naoimitate.hw.none import NoDriver
+from naoimitate.live.loop import Beat, Loop
+from naoimitate.live.protocols.registry import PROTOCOLS
+from naoimitate.live.receiver import Receiver
+from naoimitate.live.recording import Recorder, play, read_recording
+from naoimitate.live.session import Session, SessionSettings
+from naoimitate.live.stream import Stream
+from naoimitate.motion.builtin import tpose
+from naoimitate.robot.model import RobotModel
+from naoimitate.run.columns import constants
+from naoimitate.run.file import load_run
+from naoimitate.run.journal import Journal, finish, journal_path
+
+QUICK = SessionSettings(predict=0.05, hold=0.15, back=0.5, blend_in=0.2, blend_back=0.2)
+JSON = PROTOCOLS["json"]
+
+
+@dataclass
+class Sender:
+    """Sends the T-pose 100 times a second, whenever it is told to."""
+
+    port: int
+
+    def __post_init__(self) -> None:
+        self.encoder, self.count = JSON.encoder(), 0
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+
+    def send(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            frame = replace(tpose(), time=self.count * 0.01)
+            for datagram in self.encoder.encode(frame, self.count, frame.time):
+                self.socket.sendto(datagram, ("127.0.0.1", self.port))
+            self.count += 1
+            time.sleep(0.01)
+
+
+def rig(nao: RobotModel) -> tuple[Session, Receiver, Loop, list[Beat]]:
+    session, receiver = Session(nao, live=QUICK), Receiver("127.0.0.1", 0)
+    session.warm_up()
+    beats: list[Beat] = []
+    stream = Stream(JSON, tuple(PROTOCOLS.values()))
+    driver = NoDriver(nao)
+    driver.connect()
+    return session, receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
+
+
+def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(
+    nao: RobotModel, tmp_path: Path
+) -> None:
+    session, receiver, loop, beats = rig(nao)
+    recorder = Recorder(tmp_path / "stream.rec", {"protocol": "json"})
+    loop.record = recorder.datagram
+    loop.watch.append(lambda beat: recorder.step(beat.now))
+    sender, done = Sender(receiver.port), threading.Event()
+
+    def story() -> None:
+        for seconds, pause in ((0.2, 0.3), (2.2, 0.3), (0.6, 0.9), (0.8, 0.0)):
+            sender.send(seconds)
+            time.sleep(pause)
+        done.set()
+
+    thread = threading.Thread(target=story)
+    thread.start()
+    loop.run(duration=30.0, ended=done.is_set)
+    thread.join()
+    recorder.close()
+    receiver.close()
+    states = [beat.tick.state.value for beat in beats]
+    order = [s for k, s in enumerate(states) if k == 0 or states[k - 1] != s]
+    assert order[0] == "waiting" and order[-1] in ("blending", "tracking")
+    wanted = ["waiting", "calibrating", "waiting", "calibrating", "blending", "tracking", "holding", "blending"]
+    assert order[: len(wanted)] == wanted
+    assert "returning" in order
+    again = Session(nao, live=QUICK)
+    again.warm_up()
+    repeated = list(play(read_recording(tmp_path / "stream.rec"), again, Stream(JSON, ())))
+    assert len(repeated) == len(beats)
+    for (_, tick), beat in zip(repeated, beats, strict=True):
+        assert np.array_equal(tick.command.q, beat.tick.command.q)
+        assert tick.state is beat.tick.state
+
+
+def test_another_protocol_than_asked_for_is_named(nao: RobotModel) -> None:
+    _, receiver, loop, _ = rig(nao)
+    encoder, out = PROTOCOLS["xsens"].encoder(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    for k in range(5):
+        for datagram in encoder.encode(tpose(), k, 0.01 * k):
+            out.sendto(datagram, ("127.0.0.1", receiver.port))
+    with pytest.raises(StreamError, match="this looks like"):
+        loop.run(duration=0.2)
+    receiver.close()
+
+
+def test_a_port_in_use_is_one_clear_error() -> None:
+    first = Receiver("127.0.0.1", 0)
+    with pytest.raises(StreamError, match="in use"):
+        Receiver("127.0.0.1", first.port)
+    first.close()
+
+
+@pytest.mark.parametrize("bind", ["192.0.2.1", "no such host"])
+def test_an_address_of_another_machine_is_one_clear_error(bind: str) -> None:
+    with pytest.raises(StreamError, match="--bind"):
+        Receiver(bind, 0)
+
+
+def journal(nao: RobotModel, out: Path, frames: int) -> Journal:
+    session = Session(nao)
+    session.start()
+    fixed = constants(nao, session.imitator.mapping, "planted", "live:json", "{}")
+    written = Journal(out, fixed)
+    for k in range(frames):
+        tick = session.step(0.01 * k)
+        written.add(tick.command, tick.arrival, tick.state.value, np.nan, 1e-3)
+    return written
+
+
+def test_a_journal_becomes_a_run_file(nao: RobotModel, tmp_path: Path) -> None:
+    out = tmp_path / "run.npz"
+    made = journal(nao, out, 130).close()
+    assert made is not None and len(made) == len(load_run(out)) == 130
+    assert set(made.session or ()) == {"waiting"}
+    assert not journal_path(out).exists()
+
+
+def test_a_killed_session_loses_half_a_second_at_most(nao: RobotModel, tmp_path: Path) -> None:
+    out = tmp_path / "run.npz"
+    journal(nao, out, 230)
+    whole = journal_path(out).read_bytes()
+    journal_path(out).write_bytes(whole[:-1000])
+    assert command(["recover", str(out)]) == 0
+    assert 230 - 2 * 51 <= len(load_run(out)) < 230
+
+
+@pytest.mark.parametrize("content", [b"", b"junk", b"\xff" * 100])
+def test_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> None:
+    out = tmp_path / "run.npz"
+    journal_path(out).write_bytes(content)
+    with pytest.raises(RunFileError, match="no journal"):
+        finish(out)
+
+
+def test_a_torn_recording_plays_to_its_tear_and_other_files_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.rec"
+    recorder = Recorder(path, {"protocol": "json"})
+    for k in range(100):
+        recorder.step(0.01 * k)
+    recorder.close()
+    path.write_bytes(path.read_bytes()[:-4])
+    assert len(read_recording(path).events) == 99
+    path.write_bytes(b"x" * 50)
+    with pytest.raises(StreamError, match="no recording"):
+        read_recording(path)
+
+
+def test_the_command_says_when_it_is_ready_and_ends_in_peace(tmp_path: Path) -> None:
+    arguments = ["live", "--source", "json", "--port", "0", "--driver", "none", "--duration", "0.5"]
+    program = [sys.executable, "-m", "naoimitate.cli", *arguments]
+    result = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
+    assert result.returncode == 0, result.stderr
+    assert "ready" in result.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments, word",
+    [
+        (["--source", "nonsense", "--driver", "none"], "there are xsens"),
+        (["--source", "replay:missing.rec", "--driver", "none"], "cannot read"),
+        (["--source", "json", "--driver", "none", "--bind", "192.0.2.7"], "--bind"),
+    ],
+)
+def test_mistakes_are_one_line(arguments: list[str], word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert command(["live", *arguments]) == 2
+    error = capsys.readouterr().err
+    assert word in error and error.count("\n") == 1
