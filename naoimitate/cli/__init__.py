@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import click
 
 from naoimitate.cli.calibrate import calibrate
+from naoimitate.cli.can_stub import can_stub
 from naoimitate.cli.check import check
 from naoimitate.cli.demo import demo
 from naoimitate.cli.imitate import imitate
@@ -19,6 +20,7 @@ from naoimitate.cli.motions import motions
 from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
 from naoimitate.cli.score import score
+from naoimitate.cli.stream import stream
 from naoimitate.core.errors import NaoimitateError
 
 MISTAKE = 2
@@ -36,7 +38,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (demo, imitate, score, check, calibrate, motions, robots, reproduce):
+for _command in (demo, imitate, score, check, calibrate, motions, robots, reproduce, stream, can_stub):
     cli.add_command(_command)
 
 
