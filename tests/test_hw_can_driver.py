@@ -126,9 +126,9 @@ def test_sign_gear_zero_and_torque_constant_stand_between_joint_and_motor(nao: R
         q = robot.postures["stand"].copy()
         q[knee] = 0.5
         it.driver.write(command(robot, q))
-        assert wait_for(lambda: abs(it.stub.motors[11].position + 2.5 * 0.4) < 2 * STEP)
+        assert wait_for(lambda: abs(it.driver.read().q[knee] - 0.5) < STEP)
+        assert abs(it.stub.motors[11].position + 2.5 * 0.4) < 2 * STEP
         state = it.driver.read()
-        assert abs(state.q[knee] - 0.5) < 2 * STEP
         assert state.torque[knee] == pytest.approx(-1.5 * 0.4)  # the simulated motors take 0.4 A
         assert np.isnan(state.torque[robot.joint("HeadYaw")])
 

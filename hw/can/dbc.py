@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import cast
 
 import can
 import cantools
@@ -101,12 +102,20 @@ class DbcCodec:
             raise CorruptFrame(motor, f"{layout.name} has {len(data)} bytes instead of {layout.length}")
         if data[-1] != crc8(layout.frame_id, data[:-1]):
             raise CorruptFrame(motor, f"{layout.name} has a wrong checksum")
-        value = layout.decode_simple(data, decode_choices=False)
-        status = self._states[motor].get(value["status"])
+        value = cast(dict[str, float], layout.decode_simple(data, decode_choices=False))  # plain numbers, no names
+        status = self._states[motor].get(int(value["status"]))
         if status is None:
             raise CorruptFrame(motor, f"{layout.name} has the unknown status {value['status']}")
-        measured = (float(value[name]) for name in ("position", "speed", "current", "temperature"))
-        return Feedback(motor, *measured, status, int(value["counter"]), self._counters[motor])
+        return Feedback(
+            motor,
+            position=float(value["position"]),
+            speed=float(value["speed"]),
+            current=float(value["current"]),
+            temperature=float(value["temperature"]),
+            status=status,
+            counter=int(value["counter"]),
+            counters=self._counters[motor],
+        )
 
     def _encode(self, targets: Targets, mode: str) -> list[can.Message]:
         self._counter = (self._counter + 1) % self._modulus
@@ -195,5 +204,5 @@ def _or(value: float | None, other: float) -> float:
 def _sealed(layout: Layout, values: dict[str, float]) -> can.Message:
     """A frame with its checksum."""
     data = bytearray(layout.encode(values, strict=False))
-    data[-1] = crc8(layout.frame_id, data[:-1])
+    data[-1] = crc8(layout.frame_id, bytes(data[:-1]))
     return can.Message(arbitration_id=layout.frame_id, is_extended_id=False, data=data)

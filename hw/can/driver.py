@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
+from naoimitate.calib.zeros import JointZeros
 from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.can.bus import open_bus
@@ -61,8 +61,8 @@ class CanDriver:
 
     interface, channel: as python-can names them (``socketcan``, ``can0``). codec: ``dbc`` or an object that follows
     ``Codec``. compensation: add what the servos need against gravity. period: s, None = the database's cycle time.
-    bitrate: bit/s, None = robot.yaml's. database: DBC file instead of the robot's own. zeros: calibrated joint angles
-    (rad) at which motors read 0. Raises DriverError where robot.yaml, database and bus load do not allow driving.
+    bitrate: bit/s, None = robot.yaml's. database: DBC file instead of the robot's own. zeros: how far this
+    specimen's encoders are off. Raises DriverError where robot.yaml, database and bus load do not allow driving.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class CanDriver:
         period: float | None = None,
         bitrate: int | None = None,
         database: Path | None = None,
-        zeros: Mapping[str, float] | None = None,
+        zeros: JointZeros | None = None,
         settings: CanSettings = DEFAULT,
     ) -> None:
         self._interface, self._channel, self._settings = interface, channel, settings

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.calib.zeros import JointZeros, no_zeros
 from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.robot.model import RobotModel
@@ -26,7 +27,7 @@ HAND_SPEED = 2.0
 class MotorEntry:
     """One motor as robot.yaml has it; ``lower``, ``upper`` and ``speed`` are the joint's where they are not given.
 
-    motor angle = sign * gear * (joint angle - zero).
+    motor angle = sign * gear * (joint angle + calibrated zero - zero).
     """
 
     id: int
@@ -111,8 +112,8 @@ class JointMap:
         return joints
 
 
-def read_joint_map(robot: RobotModel, zeros: Mapping[str, float] | None = None) -> JointMap:
-    """The joint map of a robot; zeros: joint angles (rad) by name that calibration found instead of robot.yaml's.
+def read_joint_map(robot: RobotModel, zeros: JointZeros | None = None) -> JointMap:
+    """The joint map of a robot; zeros: what calibration found for this specimen, on top of robot.yaml's zeros.
 
     DriverError for a joint without a motor, and for a motor without a joint or twice on the bus.
     """
@@ -121,23 +122,20 @@ def read_joint_map(robot: RobotModel, zeros: Mapping[str, float] | None = None) 
         raise DriverError(
             f"{robot.name} has no joint map: add a section `can` to its robot.yaml, or use another driver"
         )
-    joints = _entries(section, "joints", zeros or {})
-    hands = _entries(section, "hands", zeros or {})
-    _check_names(robot, joints, hands, zeros or {})
+    joints, hands = _entries(section, "joints"), _entries(section, "hands")
+    _check_names(robot, joints, hands)
     order = [(i, joints[name]) for i, name in enumerate(robot.joint_names) if name in joints]
     order += [(HAND, hands[name]) for name in hands]
     names = [robot.joint_names[i] for i, _ in order if i != HAND] + list(hands)
-    return _build(robot, names, order)
+    return _build(robot, names, order, no_zeros(robot) if zeros is None else zeros)
 
 
-def _entries(section: Mapping[str, Any], key: str, zeros: Mapping[str, float]) -> dict[str, MotorEntry]:
+def _entries(section: Mapping[str, Any], key: str) -> dict[str, MotorEntry]:
     """The motors of a part of the section, with its ``defaults`` filled in."""
     known = {field.name for field in fields(MotorEntry)}
     entries = {}
     for name, own in section.get(key, {}).items():
         values = {**section.get("defaults", {}), **own}
-        if name in zeros:
-            values["zero"] = zeros[name]
         if unknown := values.keys() - known:
             raise DriverError(f"robot.yaml, can: {name} has an unknown {min(unknown)!r}; known are {sorted(known)}")
         if "id" not in values or abs(values.get("sign", 1)) != 1 or not values.get("gear", 1.0) > 0.0:
@@ -146,25 +144,23 @@ def _entries(section: Mapping[str, Any], key: str, zeros: Mapping[str, float]) -
     return entries
 
 
-def _check_names(
-    robot: RobotModel, joints: Mapping[str, MotorEntry], hands: Mapping[str, MotorEntry], zeros: Mapping[str, float]
-) -> None:
+def _check_names(robot: RobotModel, joints: Mapping[str, MotorEntry], hands: Mapping[str, MotorEntry]) -> None:
     followers = {robot.joint_names[follower] for _, follower in robot.coupled}
-    known = [(joints, robot.joint_names), (hands, robot.data.get("hands", {}).values()), (zeros, [*joints, *hands])]
+    known = [(joints, robot.joint_names), (hands, robot.data.get("hands", {}).values())]
     for name in robot.joint_names:
         if name not in joints and name not in followers:
             raise DriverError(f"the joint {name} has no motor: add it to can, joints in the robot.yaml of {robot.name}")
     for name, names in [(name, names) for part, names in known for name in part]:
         if name not in names and name not in followers:
-            raise DriverError(f"{robot.name} has no joint or hand {name!r}: correct the joint map or the joint zeros")
+            raise DriverError(f"{robot.name} has no joint or hand {name!r}: correct the joint map")
         if name in followers:
-            raise DriverError(f"{name} shares another joint's motor: remove it from the joint map or the joint zeros")
+            raise DriverError(f"{name} shares another joint's motor: remove it from the joint map")
     nodes = [entry.id for entry in [*joints.values(), *hands.values()]]
     if twice := {node for node in nodes if nodes.count(node) > 1}:
         raise DriverError(f"robot.yaml, can: two joints have the id {min(twice)}: give every motor its own")
 
 
-def _build(robot: RobotModel, names: list[str], order: list[tuple[int, MotorEntry]]) -> JointMap:
+def _build(robot: RobotModel, names: list[str], order: list[tuple[int, MotorEntry]], zeros: JointZeros) -> JointMap:
     entries = [entry for _, entry in order]
     joint = np.array([index for index, _ in order])
     by_side = robot.data.get("hands", {})
@@ -184,7 +180,7 @@ def _build(robot: RobotModel, names: list[str], order: list[tuple[int, MotorEntr
         hands=(hands[0], hands[1]),
         followers=robot.coupled,
         factor=column("sign") * column("gear"),
-        zero=column("zero"),
+        zero=column("zero") - np.where(joint == HAND, 0.0, zeros.offsets[joint]),
         lower=limit("lower", robot.lower, 0.0),
         upper=limit("upper", robot.upper, 1.0),
         speed=limit("speed", robot.speed, HAND_SPEED),

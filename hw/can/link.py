@@ -26,7 +26,7 @@ class Link(can.Listener):
         self.strange = 0
         """Frames that were neither a motor's nor our own kind."""
         self._bus, self._codec, self._health = bus, codec, health
-        self._sending = threading.Lock()
+        self._sending = threading.RLock()  # an emergency stop may come from a signal handler
         self._ours: set[int] = set()
         self._notifier = can.Notifier(bus, [self], timeout=RECEIVE_TIMEOUT)
 

@@ -14,6 +14,7 @@ from pathlib import Path
 import can
 import cantools
 from cantools.database import Database
+from cantools.database.namedsignalvalue import NamedSignalValue
 from crccheck.crc import Crc8SaeJ1850
 
 from naoimitate.core.errors import DriverError
@@ -135,7 +136,7 @@ class CanStub:
         layout = self._database.get_message_by_name(f"Feedback_{node:02d}")
         self._sent[node] = (self._sent[node] + 1) % 16
         self._told[node] = motor.status
-        values = {
+        values: dict[str, int | float | str | NamedSignalValue] = {
             "position": motor.position,
             "speed": motor.speed,
             "current": CURRENT * motor.stiffness,
