@@ -23,7 +23,8 @@ from naoimitate.live.protocols.vmc_encoder import LARGEST
 from naoimitate.motion.builtin import builtin_motion, builtin_names, tpose
 
 MESSAGE, BUNDLE = (
-    bytes.fromhex(line.split(": ")[1]) for line in (Path(__file__).parent / "data/vmc_datagrams.txt").open()
+    bytes.fromhex(line.split(": ")[1])
+    for line in (Path(__file__).parent / "data/vmc_datagrams.txt").read_text().splitlines()
 )
 """The worked examples of shared/protocols.md, section 3."""
 ROOT_HALF = float(np.float32(math.sqrt(0.5)))
