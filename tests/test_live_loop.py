@@ -62,9 +62,7 @@ def rig(nao: RobotModel) -> tuple[Session, Receiver, Loop, list[Beat]]:
     return session, receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
 
 
-def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(
-    nao: RobotModel, tmp_path: Path
-) -> None:
+def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(nao: RobotModel, tmp_path: Path) -> None:
     session, receiver, loop, beats = rig(nao)
     recorder = Recorder(tmp_path / "stream.rec", {"protocol": "json"})
     loop.record = recorder.datagram

@@ -27,7 +27,9 @@ from naoimitate.motion.builtin import builtin_motion, builtin_names, tpose
 
 EXAMPLES = {
     name: bytes.fromhex(text)
-    for name, text in (line.split(": ") for line in (Path(__file__).parent / "data/xsens_datagrams.txt").open())
+    for name, text in (
+        line.split(": ") for line in (Path(__file__).parent / "data/xsens_datagrams.txt").read_text().splitlines()
+    )
 }
 """The worked examples of shared/protocols.md, section 1.8."""
 MOTIONS = {name: builtin_motion(name) for name in builtin_names()}

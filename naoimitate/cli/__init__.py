@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import click
 
 from naoimitate.cli.calibrate import calibrate
+from naoimitate.cli.can_stub import can_stub
 from naoimitate.cli.check import check
 from naoimitate.cli.demo import demo
 from naoimitate.cli.imitate import imitate
@@ -21,6 +22,7 @@ from naoimitate.cli.recover import recover
 from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
 from naoimitate.cli.score import score
+from naoimitate.cli.stream import stream
 from naoimitate.core.errors import NaoimitateError
 
 MISTAKE = 2
@@ -38,7 +40,9 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (demo, imitate, live, score, check, calibrate, motions, robots, recover, reproduce):
+for _command in (
+    demo, imitate, live, stream, score, check, calibrate, motions, robots, recover, reproduce, can_stub,
+):  # fmt: skip
     cli.add_command(_command)
 
 

@@ -1,4 +1,4 @@
-"""What streams of joints lack: the ends of head, hands and feet by a person's proportions, and how open hands are."""
+"""What streams of joints lack: ends of head, hands and feet by proportions, open hands, and signs that go on."""
 
 from __future__ import annotations
 
@@ -81,6 +81,14 @@ def add_ends(
 def opening(bends: Array) -> float:
     """How open a hand is, 0 closed to 1 open, from bends (N,) rad of the first two joints of its fingers."""
     return min(max(1.0 - float(np.mean(bends)) / FIST, 0.0), 1.0)
+
+
+def same_signs(orientations: Array, before: Array | None) -> Array:
+    """Quaternions (N, 4) with the signs, which are free, that continue those of the frame before."""
+    if before is None:
+        return orientations
+    opposite = np.einsum("ij,ij->i", orientations, before) < 0.0
+    return np.where(opposite[:, None], -orientations, orientations) if opposite.any() else orientations
 
 
 def _carried(

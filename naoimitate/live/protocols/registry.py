@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from importlib.util import find_spec
-
+from naoimitate.live.protocols.plain import JSON
+from naoimitate.live.protocols.rokoko import ROKOKO
+from naoimitate.live.protocols.vmc import VMC
+from naoimitate.live.protocols.xsens import XSENS
 from naoimitate.live.sample import StreamProtocol
 
-_HOME = "naoimitate.live.protocols."
-_CONSTANTS = {"xsens": "XSENS", "vmc": "VMC", "rokoko": "ROKOKO", "plain": "JSON"}
-_FOUND: list[StreamProtocol] = [
-    getattr(import_module(_HOME + module), constant)
-    for module, constant in _CONSTANTS.items()
-    if find_spec(_HOME + module)
-]
-PROTOCOLS: dict[str, StreamProtocol] = {protocol.name: protocol for protocol in _FOUND}
+PROTOCOLS: dict[str, StreamProtocol] = {protocol.name: protocol for protocol in (XSENS, VMC, ROKOKO, JSON)}
 """Protocols by the names that ``--source`` and ``--protocol`` take."""
 
 

@@ -18,7 +18,7 @@ from naoimitate.live.protocols import mxtp
 from naoimitate.live.protocols.mxtp import ROW, Header
 from naoimitate.live.protocols.mxtp_com import CentreOfMass, Convention
 from naoimitate.live.protocols.mxtp_parts import Parts
-from naoimitate.live.protocols.proportions import add_ends, opening
+from naoimitate.live.protocols.proportions import add_ends, opening, same_signs
 from naoimitate.live.protocols.xsens_body import JOINT_OF, POINT_OF, POINT_SHARE, SEGMENT_OF, SIDE
 from naoimitate.live.protocols.xsens_encoder import XsensEncoder
 from naoimitate.live.sample import Sample, StreamProtocol
@@ -119,9 +119,7 @@ def _frame(character: _Character, header: Header, table: Array, hands: Array | N
     add_ends(landmarks, orientations, _ENDS, character.points)
     if np.isnan(landmarks).all():
         return None
-    if character.turns is not None:  # the sign of a quaternion is free: it goes on
-        orientations[np.einsum("ij,ij->i", orientations, character.turns) < 0.0] *= -1.0
-    character.turns = orientations
+    character.turns = orientations = same_signs(orientations, character.turns)
     return HumanFrame(0.001 * header.milliseconds, landmarks, orientations, com=com, hand_opening=hands)
 
 

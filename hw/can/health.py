@@ -1,0 +1,110 @@
+"""What is wrong on the bus: frames are counted, and what lasts becomes an alarm that a person can read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from naoimitate.core.frames import Array
+from naoimitate.hw.can.codec import FAULTS, Feedback, MotorStatus
+from naoimitate.hw.can.joints import JointMap
+
+MEMORY = 1.0
+"""s that a damaged frame or a bus error stays an alarm."""
+BEHIND = 0.2
+"""rad at the joint that a motor may be away from where it was sent: a fast servo lags by up to half of it."""
+BEHIND_TIME = 0.3
+"""s that it may be further away than that."""
+BUS_OFF_BIT = 0x40
+"""Of an error frame's identifier: the host's controller has left the bus (Linux, linux/can/error.h)."""
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Frames since the connection: received from motors, damaged, lost (gaps of the counters), error frames of the
+    bus, unsent (refused by the bus)."""
+
+    received: int = 0
+    damaged: int = 0
+    lost: int = 0
+    errors: int = 0
+    unsent: int = 0
+
+
+class Health:
+    """Judges the motors of a joint map. Times are s on one clock that the caller brings."""
+
+    def __init__(self, joint_map: JointMap) -> None:
+        self._map = joint_map
+        motors = len(joint_map)
+        self.counts = Counts()
+        self.seen = np.full(motors, -np.inf)
+        self.status = [MotorStatus.OFF] * motors
+        self._temperature = np.full(motors, np.nan)
+        self._counter: list[int | None] = [None] * motors
+        self._damaged = np.full(motors, -np.inf)
+        self._near = np.full(motors, np.inf)
+        self._troubles: dict[str, float] = {}
+
+    def feedback(self, feedback: Feedback, now: float) -> None:
+        """Take notice of a motor's answer."""
+        motor, counter, last = feedback.motor, feedback.counter, self._counter[feedback.motor]
+        lost = 0 if counter is None or last is None else (counter - last - 1) % feedback.counters
+        self.counts = replace(self.counts, received=self.counts.received + 1, lost=self.counts.lost + lost)
+        self._counter[motor] = counter
+        self.seen[motor] = now
+        self.status[motor] = feedback.status
+        self._temperature[motor] = feedback.temperature
+
+    def damaged(self, motor: int, now: float) -> None:
+        """Take notice of a damaged frame of a motor."""
+        self.counts = replace(self.counts, damaged=self.counts.damaged + 1)
+        self._damaged[motor] = now
+
+    def error_frame(self, identifier: int, now: float) -> None:
+        """Take notice of an error frame; identifier: its bits as Linux has them."""
+        self.counts = replace(self.counts, errors=self.counts.errors + 1)
+        off = bool(identifier & BUS_OFF_BIT)
+        self.trouble("the CAN controller is off the bus (bus-off)" if off else "error frames on the CAN bus", now)
+
+    def unsent(self, reason: str, now: float) -> None:
+        """Take notice of frames that the bus did not take."""
+        self.counts = replace(self.counts, unsent=self.counts.unsent + 1)
+        self.trouble(f"the CAN bus takes no commands ({reason})", now)
+
+    def trouble(self, sentence: str, now: float) -> None:
+        """Any other trouble of the bus, an alarm for a while."""
+        self._troubles[sentence] = now
+
+    def follow(self, error: Array | None, now: float) -> None:
+        """How far (N,) rad the joints are from where they were sent; None where they need not follow."""
+        if error is None:
+            self._near[:] = now
+        else:
+            self._near[np.abs(error) <= BEHIND] = now
+
+    def alarms(self, now: float, driving: bool) -> tuple[str, ...]:
+        """A sentence for everything that is wrong; driving: the motors are expected to follow."""
+        sentences = [sentence for sentence, when in list(self._troubles.items()) if now - when < MEMORY]
+        for motor in range(len(self._map)):
+            if (what := self._complaint(motor, now, driving)) is not None:
+                sentences.append(f"{self._map.title(motor)} {what}")
+        return tuple(sentences)
+
+    def _complaint(self, motor: int, now: float, driving: bool) -> str | None:
+        """What is worst about a motor."""
+        status = self.status[motor]
+        if now - self._damaged[motor] < MEMORY:
+            return "sends damaged frames"
+        if now - self.seen[motor] > self._map.watchdog[motor]:
+            return "is silent"
+        if status in FAULTS:
+            return f"has switched itself off: {status.value}"
+        if self._temperature[motor] >= self._map.hot[motor]:
+            return f"is hot (over {self._map.hot[motor]:g} degrees)"
+        if driving and status is not MotorStatus.FOLLOWING:
+            return f"does not follow any more: {status.value}"
+        if driving and now - self._near[motor] > BEHIND_TIME:
+            return "does not get where it is sent"
+        return None

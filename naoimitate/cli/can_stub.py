@@ -1,0 +1,57 @@
+"""``naoimitate can-stub``: simulated motors on a CAN bus, to try ``live --driver can`` without a robot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+
+@click.command("can-stub")
+@click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with its data.")
+@click.option("--robot-version", default=None, help="One of its versions; its default one otherwise.")
+@click.option("--interface", default="udp_multicast", show_default=True, help="An interface of python-can.")
+@click.option("--channel", default="239.74.163.2", show_default=True, help="The interface's channel, such as can0.")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="NODE:KIND@SECONDS",
+    help="NODE: a motor's number or joint; KIND: stuck, silent, crc, hot or bus-off; SECONDS after the start.",
+)
+@click.option("--database", type=click.Path(path_type=Path, dir_okay=False), help="DBC file, not the robot's own.")
+@click.option("--duration", type=click.FloatRange(min=0.0), help="s to run; until Ctrl-C otherwise.")
+def can_stub(
+    robot: str,
+    robot_version: str | None,
+    interface: str,
+    channel: str,
+    faults: tuple[str, ...],
+    database: Path | None,
+    duration: float | None,
+) -> None:
+    """Simulate a robot's motors on a CAN bus.
+
+    They answer commands, move with their speed limits, and hold when no commands come for 0.1 s.
+    """
+    import threading
+
+    from naoimitate.hw.can.bus import open_bus
+    from naoimitate.hw.can.stub import CanStub, motor_numbers
+    from naoimitate.hw.can.stub_faults import parse_fault
+    from naoimitate.robot import load_robot
+
+    model = load_robot(robot, robot_version)
+    wanted = [parse_fault(text, motor_numbers(model)) for text in faults]
+    bus = open_bus(interface, channel, int(model.data["can"].get("bitrate", 1_000_000)))
+    try:
+        stub = CanStub(model, bus, wanted, database)
+        stub.start()
+        click.echo(f"ready: {len(stub.motors)} motors of {model.name} on {interface} {channel}")
+        threading.Event().wait(duration)
+        stub.stop()
+    finally:
+        bus.shutdown()
+    click.echo(
+        f"ignored: {stub.damaged} damaged and {stub.repeated} repeated commands; {stub.unsent} answers were lost"
+    )
