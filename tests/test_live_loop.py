@@ -52,24 +52,25 @@ class Sender:
             time.sleep(0.01)
 
 
-def rig(nao: RobotModel) -> tuple[Session, Receiver, Loop, list[Beat]]:
+def rig(nao: RobotModel) -> tuple[Receiver, Loop, list[Beat]]:
     session, receiver = Session(nao, live=QUICK), Receiver("127.0.0.1", 0)
     session.warm_up()
     beats: list[Beat] = []
     stream = Stream(JSON, tuple(PROTOCOLS.values()))
     driver = NoDriver(nao)
     driver.connect()
-    return session, receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
+    return receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
 
 
 def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(nao: RobotModel, tmp_path: Path) -> None:
-    session, receiver, loop, beats = rig(nao)
+    receiver, loop, beats = rig(nao)
     recorder = Recorder(tmp_path / "stream.rec", {"protocol": "json"})
     loop.record = recorder.datagram
     loop.watch.append(lambda beat: recorder.step(beat.now))
     sender, done = Sender(receiver.port), threading.Event()
 
     def story() -> None:
+        time.sleep(0.3)
         for seconds, pause in ((0.2, 0.3), (2.2, 0.3), (0.6, 0.9), (0.8, 0.0)):
             sender.send(seconds)
             time.sleep(pause)
@@ -97,7 +98,7 @@ def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(n
 
 
 def test_another_protocol_than_asked_for_is_named(nao: RobotModel) -> None:
-    _, receiver, loop, _ = rig(nao)
+    receiver, loop, _ = rig(nao)
     encoder, out = PROTOCOLS["xsens"].encoder(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for k in range(5):
         for datagram in encoder.encode(tpose(), k, 0.01 * k):
@@ -135,7 +136,7 @@ def test_a_journal_becomes_a_run_file(nao: RobotModel, tmp_path: Path) -> None:
     out = tmp_path / "run.npz"
     made = journal(nao, out, 130).close()
     assert made is not None and len(made) == len(load_run(out)) == 130
-    assert set(made.session or ()) == {"waiting"}
+    assert made.session is not None and set(made.session) == {"waiting"}
     assert not journal_path(out).exists()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from naoimitate.robot.model import RobotModel
     from naoimitate.run.journal import Journal
 
-DRIVERS = ("mujoco", "none")
+DRIVERS = ("mujoco", "can", "none")
 
 
 @click.command()
@@ -26,6 +27,9 @@ DRIVERS = ("mujoco", "none")
 @click.option("--port", type=click.IntRange(0, 65535), help="UDP port [default: the protocol's own; 0: any].")
 @click.option("--allow", metavar="ADDRESS", help="Listen to this sender only [default: the first that comes].")
 @click.option("--driver", type=click.Choice(DRIVERS), required=True, help="The robot to command.")
+@click.option("--can-interface", default="socketcan", show_default=True, help="Of the CAN bus, as python-can has it.")
+@click.option("--can-channel", default="can0", show_default=True, help="Of the CAN bus.")
+@click.option("--can-codec", type=click.Choice(["dbc"]), default="dbc", show_default=True, help="What motors speak.")
 @click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
@@ -49,8 +53,9 @@ def live(**options: Any) -> None:
     robot = load_robot(options["robot"], options["robot_version"])
     subject = load_subject(options["subject"]) if options["subject"] else None
     choices = SessionSettings(filtered=not options["no_filter"], mirror=options["mirror"])
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     session = Session(robot, _settings(options["speed_limit"]), choices, subject)
-    driver = GuardedDriver(_driver(options["driver"], robot), CommandGate(robot))
+    driver = GuardedDriver(_driver(options, robot), CommandGate(robot))
     if options["source"].startswith("replay:"):
         _replay(Path(options["source"][len("replay:") :]), session, driver, robot, options)
     else:
@@ -75,11 +80,16 @@ def _settings(share: float) -> Any:
     return replace(usual, limits=slower)
 
 
-def _driver(name: str, robot: RobotModel) -> Driver:
-    if name == "none":
+def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
+    if options["driver"] == "none":
         from naoimitate.hw.none import NoDriver
 
         return NoDriver(robot)
+    if options["driver"] == "can":
+        from naoimitate.hw.can import CanDriver
+
+        names = {key: options[f"can_{key}"] for key in ("interface", "channel", "codec")}
+        return CanDriver(robot, **names)
     from naoimitate.sim.driver import MujocoDriver
 
     return MujocoDriver(robot)
