@@ -49,7 +49,7 @@ class Address:
     """Where to send to: family of addresses, and the socket's address. text: for people."""
 
     family: socket.AddressFamily
-    place: tuple[str | int, ...]
+    place: tuple[str | int | bytes, ...]
     text: str
 
 
@@ -138,8 +138,8 @@ def address(text: str, port: int) -> Address:
     if not found:
         raise StreamError(f"{text!r} names no host: write HOST:PORT, like 127.0.0.1:{port}")
     family, _, _, _, place = found[0]
-    shown = f"[{place[0]}]" if family == socket.AF_INET6 else place[0]
-    return Address(family, place, f"{shown}:{place[1]}")
+    shown = f"[{place[0]!s}]" if family == socket.AF_INET6 else str(place[0])
+    return Address(family, place, f"{shown}:{place[1]!s}")
 
 
 class UdpSender:

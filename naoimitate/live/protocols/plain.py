@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
-import numpy.typing as npt
 
 from naoimitate.core.errors import DatagramError
 from naoimitate.core.frames import LANDMARKS, SEGMENTS, Array, HumanFrame
@@ -132,9 +131,9 @@ class JsonEncoder:
         return [msgspec.json.encode(said)]
 
 
-def _known(names: tuple[str, ...], rows: npt.NDArray[np.float64]) -> dict[str, Any]:
+def _known(names: tuple[str, ...], rows: Array) -> dict[str, Any]:
     """Rows by name, those with NaN left out."""
-    known = np.isfinite(rows).reshape(len(names), -1).all(axis=1)
+    known = np.isfinite(rows.reshape(len(names), -1).sum(axis=1)).tolist()
     return {name: row for name, row, good in zip(names, rows.round(DIGITS).tolist(), known, strict=True) if good}
 
 

@@ -91,7 +91,8 @@ class RokokoDecoder:
         Raises DatagramError, and nothing else, for whatever is not a frame of JSON v3.
         """
         scene = _scene(datagram)
-        samples, names = [], []
+        samples: list[Sample] = []
+        names: list[bytes] = []
         for actor in msgspec.structs.astuple(scene.actors):
             if actor is not None and actor.body is not None:
                 name = bytes(memoryview(actor.name)[:LONGEST_NAME])

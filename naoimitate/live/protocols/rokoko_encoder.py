@@ -78,7 +78,7 @@ def _positions(frame: HumanFrame, stature: float) -> dict[str, Array]:
     places["spine"] = 0.5 * (frame["pelvis"] + frame["chest"])
     for s, side in SIDE.items():
         places[f"{side}Shoulder"] = 0.5 * (middle + frame[f"{s}_shoulder"])
-        ahead = (frame[f"{s}_toe"] - frame[f"{s}_ankle"]) * [1.0, 1.0, 0.0]
+        ahead = np.asarray((frame[f"{s}_toe"] - frame[f"{s}_ankle"]) * np.array([1.0, 1.0, 0.0]))
         places[f"{side}ToeEnd"] = frame[f"{s}_toe"] + TOE_END * _unit(ahead)
     for s, opening in zip(SIDE, _openings(frame), strict=True):
         if np.isfinite(opening):
@@ -89,7 +89,8 @@ def _positions(frame: HumanFrame, stature: float) -> dict[str, Array]:
 def _finger(frame: HumanFrame, s: str, opening: float) -> dict[str, Array]:
     """The middle finger of a hand, bent twice by equal angles towards the palm."""
     along = _unit(frame[f"{s}_hand"] - frame[f"{s}_wrist"])
-    aside = _unit(np.cross(along, [1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0]))
+    other = np.array([1.0, 0.0, 0.0] if abs(along[0]) < 0.9 else [0.0, 1.0, 0.0])
+    aside = _unit(np.asarray(np.cross(along, other), dtype=np.float64))
     bend, place, places = 0.5 * (1.0 - opening) * FIST, frame[f"{s}_hand"], {}
     for i, (part, length) in enumerate(zip(PHALANGES, (*BONES, 0.0), strict=True)):
         places[f"{SIDE[s]}Middle{part}"] = place

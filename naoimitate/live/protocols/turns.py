@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from naoimitate.core.frames import LANDMARK, LANDMARKS, SEGMENTS, Array
 from naoimitate.motion.reference import Reference, from_frame
 from naoimitate.motion.tpose import is_tpose
 from naoimitate.motion.track import Track
+
+Known = npt.NDArray[np.bool_]
 
 HOLD = 0.5
 """s that a T-pose must last before it is taken; the session asks for more."""
@@ -24,7 +27,7 @@ class SegmentTurns:
 
     def __init__(self) -> None:
         self._reference: Rotation | None = None
-        self._known = np.zeros(len(SEGMENTS), dtype=bool)
+        self._known: Known = np.zeros(len(SEGMENTS), dtype=bool)
         self._since: float | None = None
         self._taken = False
 
@@ -43,16 +46,16 @@ class SegmentTurns:
             self._taken = True
         if self._reference is None:
             return None
-        known = self._known & np.isfinite(joints).all(axis=-1)
+        known: Known = np.asarray(self._known & np.isfinite(joints).all(axis=-1))
         turned = _rotations(joints, known) * self._reference.inv()
         return np.where(known[:, None], np.roll(turned.as_quat(canonical=True), 1, axis=-1), np.nan)
 
     def _take(self, landmarks: Array, joints: Array) -> None:
-        known = np.isfinite(joints).all(axis=-1)
+        known: Known = np.asarray(np.isfinite(joints).all(axis=-1))
         turns = _rotations(joints, known).as_matrix()
         with np.errstate(invalid="ignore"):
             reference: Reference = from_frame(Track(landmarks[None], turns[None], _TIPS), 0, _NO_REST)
-        self._known = known & np.isfinite(reference.turns).all(axis=(-1, -2))
+        self._known = np.asarray(known & np.isfinite(reference.turns).all(axis=(-1, -2)))
         self._reference = Rotation.from_matrix(np.where(self._known[:, None, None], reference.turns, np.eye(3)))
 
 
@@ -62,6 +65,6 @@ def _perhaps_tpose(landmarks: Array) -> bool:
     return bool(abs(left_wrist - left) < RAISED and abs(right_wrist - right) < RAISED)
 
 
-def _rotations(joints: Array, known: Array) -> Rotation:
+def _rotations(joints: Array, known: Known) -> Rotation:
     """Rotations of joints (7, 4) (w, x, y, z); unknown ones are no rotation."""
     return Rotation.from_quat(np.where(known[:, None], np.roll(joints, -1, axis=-1), [0.0, 0.0, 0.0, 1.0]))
