@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 from naoimitate.cli import run as command
+from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import RunFileError, StreamError
+from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.hw.none import NoDriver
 from naoimitate.live.loop import Beat, Loop
 from naoimitate.live.protocols.registry import PROTOCOLS
@@ -57,7 +59,7 @@ def rig(nao: RobotModel) -> tuple[Receiver, Loop, list[Beat]]:
     session.warm_up()
     beats: list[Beat] = []
     stream = Stream(JSON, tuple(PROTOCOLS.values()))
-    driver = NoDriver(nao)
+    driver = GuardedDriver(NoDriver(nao), CommandGate(nao))
     driver.connect()
     return receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
 

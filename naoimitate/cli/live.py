@@ -13,6 +13,7 @@ from naoimitate.cli import types
 
 if TYPE_CHECKING:
     from naoimitate.hw.driver import Driver
+    from naoimitate.hw.guarded import GuardedDriver
     from naoimitate.live.loop import Beat
     from naoimitate.live.session import Session
     from naoimitate.robot.model import RobotModel
@@ -95,7 +96,7 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
     return MujocoDriver(robot)
 
 
-def _listen(session: Session, driver: Driver, robot: RobotModel, options: dict[str, Any]) -> None:
+def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options: dict[str, Any]) -> None:
     """The session with a stream from the network."""
     from naoimitate.core.errors import StreamError
     from naoimitate.live.loop import Loop
@@ -129,11 +130,11 @@ def _listen(session: Session, driver: Driver, robot: RobotModel, options: dict[s
         receiver.close()
         if recorder is not None:
             recorder.close()
-        for line in (*writer.close(), _summary(stream)):
+        for line in (*writer.close(), _summary(stream), _passed(driver)):
             click.echo(line)
 
 
-def _replay(path: Path, session: Session, driver: Driver, robot: RobotModel, options: dict[str, Any]) -> None:
+def _replay(path: Path, session: Session, driver: GuardedDriver, robot: RobotModel, options: dict[str, Any]) -> None:
     """A recorded session again, with the times and the commands of then."""
     import time
 
@@ -165,7 +166,7 @@ def _replay(path: Path, session: Session, driver: Driver, robot: RobotModel, opt
         click.echo("ended by the operator", err=True)
     finally:
         driver.stop()
-        for line in (*writer.close(), _summary(stream)):
+        for line in (*writer.close(), _summary(stream), _passed(driver)):
             click.echo(line)
 
 
@@ -179,6 +180,12 @@ def _summary(stream: Any) -> str:
         f"{c.datagrams} datagrams, {c.frames} frames used in order, {c.late} late, {c.lost} lost, {c.damaged} damaged, "
         f"{c.foreign} of other senders"
     )
+
+
+def _passed(driver: GuardedDriver) -> str:
+    status = driver.status
+    refused = ", ".join(f"{count} {reason}" for reason, count in sorted(status.refused.items())) or "none refused"
+    return f"{status.accepted} commands passed the gate; {refused}; the robot: {status.condition.value}"
 
 
 class Writer:

@@ -44,6 +44,7 @@ class LandmarkFilter:
         """Forget the person."""
         self._time = math.nan
         self._state: Array | None = None
+        self._age, self._strikes = np.zeros(0), np.zeros(0, dtype=np.int64)
         self._covariance = np.diag([self._s.noise**2, 1.0])
         self.outliers = 0
         """Measurements that were left out so far."""
@@ -51,7 +52,7 @@ class LandmarkFilter:
     def step(self, frame: HumanFrame) -> HumanFrame:
         """The frame, filtered; missing and outlying landmarks are predicted for a short while, then missing."""
         measured = np.asarray(frame.landmarks, dtype=np.float64)
-        known = np.isfinite(measured).all(axis=1)
+        known = np.asarray(np.isfinite(measured).all(axis=1))
         dt = frame.time - self._time
         if self._state is None or not 0.0 < dt < self._s.longest_gap:
             self._start(measured, frame.time)

@@ -8,13 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from naoimitate.core.errors import StreamError
-from naoimitate.hw.driver import Driver
+from naoimitate.hw.guarded import Condition, GuardedDriver, GuardStatus
 from naoimitate.live.receiver import Datagram, Receiver
 from naoimitate.live.session import Session, Tick
 from naoimitate.live.stream import Stream
 
 SHORTEST = 0.002
 """[s] between two steps: a frame that comes sooner waits so long."""
+REFUSED = 1.0
+"""[s] without a command that passes the gate, after which the session is in fault."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,7 @@ class Loop:
     session: Session
     stream: Stream
     receiver: Receiver
-    driver: Driver
+    driver: GuardedDriver
     watch: list[Callable[[Beat], None]] = field(default_factory=list)
     record: Callable[[Datagram], None] | None = None
 
@@ -63,6 +65,7 @@ class Loop:
             tick = self.session.step(now)
             spent = time.perf_counter() - started
             self.driver.write(tick.command)
+            self._look_after(self.driver.status)
             latency = time.monotonic() - newest[0] if newest is not None and tick.fresh else math.nan
             last = now
             beat = Beat(tick, now, latency, spent)
@@ -71,6 +74,13 @@ class Loop:
         complaint = self.stream.complaint()
         if complaint:
             raise StreamError(complaint)
+
+    def _look_after(self, status: GuardStatus) -> None:
+        """Tell the session of a robot that does not follow any more."""
+        if status.condition is not Condition.LIVE:
+            self.session.fault(status.problem or status.condition.value)
+        elif status.held > REFUSED:
+            self.session.fault(f"commands are refused: {', '.join(status.refusing)}")
 
     def _receive(self, last: float) -> None:
         """Wait for a frame, or for the driver's period; what came is taken."""
