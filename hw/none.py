@@ -28,8 +28,8 @@ class NoDriver:
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._stand, self._take, self._period, self._clock = robot.postures["stand"], take, period, clock
-        self._start, self._command, self._open = clock(), None, False
-        self._command: RobotCommand | None
+        self._command: RobotCommand | None = None
+        self._start, self._open = clock(), False
 
     @property
     def period(self) -> float:

@@ -14,7 +14,7 @@ from naoimitate.cli import types
 if TYPE_CHECKING:
     from naoimitate.hw.driver import Driver
     from naoimitate.hw.guarded import GuardedDriver
-    from naoimitate.live.loop import Beat
+    from naoimitate.live.loop import Beat, Loop
     from naoimitate.live.session import Session
     from naoimitate.robot.model import RobotModel
     from naoimitate.run.journal import Journal
@@ -122,7 +122,7 @@ def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options:
         session.warm_up()
         driver.connect()
         click.echo(f"ready: listening for {protocol.title} on {options['bind']} port {receiver.port}")
-        loop.run(math.inf if options["duration"] is None else options["duration"])
+        _run(loop, math.inf if options["duration"] is None else options["duration"])
     except KeyboardInterrupt:
         click.echo("ended by the operator", err=True)
     finally:
@@ -132,6 +132,32 @@ def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options:
             recorder.close()
         for line in (*writer.close(), _summary(stream), _passed(driver)):
             click.echo(line)
+
+
+def _run(loop: Loop, duration: float) -> None:
+    """The loop, with keys and a panel where there is a terminal."""
+    from naoimitate.live.keys import listening, pressed
+    from naoimitate.live.panel import Panel
+
+    def ended() -> bool:
+        key = pressed()
+        if key == " ":
+            loop.driver.emergency_stop()
+        elif key == "c":
+            loop.session.clutch()
+        elif key == "r":
+            loop.driver.reset()
+            loop.driver.connect()
+            loop.session.reset()
+        return key == "q"
+
+    with listening() as keys:
+        if not keys:
+            loop.run(duration)
+            return
+        with Panel(loop.session, loop.stream, loop.driver) as panel:
+            loop.watch.append(panel.take)
+            loop.run(duration, ended)
 
 
 def _replay(path: Path, session: Session, driver: GuardedDriver, robot: RobotModel, options: dict[str, Any]) -> None:

@@ -1,0 +1,99 @@
+"""What the operator sees: state, countdown, support, delays and losses, a few times a second."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from types import TracebackType
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from naoimitate.fsm.session import State
+from naoimitate.hw.guarded import GuardedDriver
+from naoimitate.live.keys import HELP
+from naoimitate.live.loop import Beat
+from naoimitate.live.session import Session
+from naoimitate.live.stream import Stream
+
+RECENT = 1000
+"""Steps that the delays are taken from."""
+PERIOD = 0.25
+"""[s] between two pictures: drawing takes time from the robot."""
+
+
+class Panel:
+    """A table in the terminal that another thread keeps up to date; the bell rings when the robot begins to follow."""
+
+    def __init__(self, session: Session, stream: Stream, driver: GuardedDriver) -> None:
+        self._session, self._stream, self._driver = session, stream, driver
+        self._latency: deque[float] = deque(maxlen=RECENT)
+        self._steps: deque[float] = deque(maxlen=RECENT)
+        self._last: Beat | None = None
+        self._console = Console(stderr=True)
+        self._live = Live(self.table(), console=self._console, auto_refresh=False)
+        self._halt = threading.Event()
+        self._thread = threading.Thread(target=self._draw, name="panel", daemon=True)
+
+    def __enter__(self) -> Panel:
+        self._live.start()
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._halt.set()
+        self._thread.join()
+        self._live.stop()
+
+    def take(self, beat: Beat) -> None:
+        """One turn of the loop."""
+        if not math.isnan(beat.latency):
+            self._latency.append(beat.latency)
+        self._steps.append(beat.step_time)
+        before, self._last = self._last, beat
+        if before is not None and before.tick.state is State.BLENDING and beat.tick.state is State.TRACKING:
+            self._console.bell()
+
+    def table(self) -> Table:
+        """Everything at a glance."""
+        table = Table(show_header=False, title="naoimitate live", caption=HELP)
+        for row in self._rows():
+            table.add_row(*row)
+        return table
+
+    def _rows(self) -> list[tuple[str, str]]:
+        counts, status, beat = self._stream.counts, self._driver.status, self._last
+        state = self._session.state.value
+        if self._session.state is State.CALIBRATING:
+            state += f": hold a T-pose for {self._session.countdown:.1f} s"
+        if self._session.reason:
+            state += f": {self._session.reason}"
+        rows = [("state", state)]
+        if beat is not None:
+            c = beat.tick.command
+            rows.append(("support", f"person {c.human_support}, robot {c.support}, offset {c.offset:.2f}"))
+            rows.append(("given up", c.given_up.name or "nothing"))
+        rate, jitter = self._stream.rate, 1e3 * self._stream.jitter
+        rows.append(("stream", f"{rate:.0f} Hz, jitter {jitter:.1f} ms, {counts.lost} lost, {counts.late} late"))
+        rows.append(("other packets", f"{counts.damaged} damaged, {counts.foreign} of other senders"))
+        rows.append(("datagram to driver", _delays(self._latency)))
+        rows.append(("imitation", _delays(self._steps)))
+        rows.append(("robot", f"{status.condition.value}, {sum(status.refused.values())} commands refused"))
+        rows.extend(("alarm", alarm) for alarm in status.alarms)
+        return rows
+
+    def _draw(self) -> None:
+        while not self._halt.wait(PERIOD):
+            self._live.update(self.table(), refresh=True)
+
+
+def _delays(seconds: deque[float]) -> str:
+    if not seconds:
+        return "-"
+    p50, p99 = np.percentile(np.array(seconds), [50, 99]) * 1e3
+    return f"p50 {p50:.2f} ms, p99 {p99:.2f} ms"

@@ -1,0 +1,34 @@
+"""What the operator sees."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+from rich.console import Console
+
+from naoimitate.command_gate import CommandGate
+from naoimitate.hw.guarded import GuardedDriver
+from naoimitate.hw.none import NoDriver
+from naoimitate.live.loop import Beat
+from naoimitate.live.panel import Panel
+from naoimitate.live.protocols.registry import PROTOCOLS
+from naoimitate.live.session import Session
+from naoimitate.live.stream import Stream
+from naoimitate.motion.builtin import tpose
+from naoimitate.robot.model import RobotModel
+
+
+def test_the_panel_shows_state_countdown_delays_and_refusals(nao: RobotModel) -> None:
+    session, driver = Session(nao), GuardedDriver(NoDriver(nao), CommandGate(nao))
+    driver.connect()
+    session.start()
+    panel = Panel(session, Stream(PROTOCOLS["json"], ()), driver)
+    for k in range(30):
+        session.see(replace(tpose(), time=0.01 * k), 0.01 * k)
+        panel.take(Beat(session.step(0.01 * k), 0.01 * k, 0.0012, 0.0005))
+    out = io.StringIO()
+    Console(file=out, width=100).print(panel.table())
+    text = out.getvalue()
+    for word in ("calibrating", "hold a T-pose for 1.2 s", "p50 1.20 ms", "robot D", "live", "0 commands refused"):
+        assert word in text, text
