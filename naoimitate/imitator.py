@@ -57,6 +57,7 @@ class Imitator:
         self._arms = Arms(robot, s.arm_weights, s.legs.range_reserve, s.hand_orientation, s.paper_ik)
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
+        self._standing = self._maker.stand(robot.postures["stand"].copy()).soles_in_base - self._hips
         self._pose: Pose | None = None
         self._blend: Blend | None = None
         self._acceleration = np.where(legs.variable >= 0, s.limits.leg_acceleration, s.limits.arm_acceleration)
@@ -133,6 +134,9 @@ class Imitator:
         seen = self._observer.see(frame, support)
         targets = self._within_reach(self.mapping.targets(seen.body.posture))
         footing = self._footing(seen, targets, ahead, may_lift)
+        if self.settings.upper_body:
+            targets[FEET] = self._standing
+            footing = replace(footing, support="D", offset=0.5, ahead="")
         if self._blend is not None:
             targets, footing = self._blended(self._blend, targets, footing)
         if self._pose is None:

@@ -474,3 +474,13 @@ def test_who_takes_over_is_imitated_from_where_the_robot_is(nao: RobotModel) -> 
     command = imitator.step(frames[-1], 0.01)
     assert np.abs(command.q - last.q).max() < 0.01
     assert command.time == pytest.approx(last.time + 0.01)
+
+
+def test_the_upper_body_alone_is_imitated_by_a_robot_that_stands(robot: RobotModel) -> None:
+    imitator = Imitator(robot, Settings(upper_body=True))
+    imitator.calibrate(tpose())
+    commands = [imitator.step(f, 0.02) for f in stream("side-kick", 50.0, 0.0, 8.0)]
+    assert {c.support for c in commands} == {"D"}
+    q = np.array([c.q for c in commands])
+    legs, arms = (robot.chains[f"l_{part}"] for part in ("leg", "arm"))
+    assert np.ptp(q[50:, list(legs)], axis=0).max() < 0.1 * np.ptp(q[:, list(arms)], axis=0).max()

@@ -34,6 +34,7 @@ DRIVERS = ("mujoco", "can", "none")
 @click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
+@click.option("--upper-body", is_flag=True, help="The robot stands, and imitates arms and head only.")
 @click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
 @click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
 @click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
@@ -55,7 +56,7 @@ def live(**options: Any) -> None:
     subject = load_subject(options["subject"]) if options["subject"] else None
     choices = SessionSettings(filtered=not options["no_filter"], mirror=options["mirror"])
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    session = Session(robot, _settings(options["speed_limit"]), choices, subject)
+    session = Session(robot, _settings(options["speed_limit"], options["upper_body"]), choices, subject)
     driver = GuardedDriver(_driver(options, robot), CommandGate(robot))
     if options["source"].startswith("replay:"):
         _replay(Path(options["source"][len("replay:") :]), session, driver, robot, options)
@@ -63,8 +64,8 @@ def live(**options: Any) -> None:
         _listen(session, driver, robot, options)
 
 
-def _settings(share: float) -> Any:
-    """The usual settings, slower."""
+def _settings(share: float, upper_body: bool) -> Any:
+    """The usual settings, slower, and for the upper body alone where that is asked for."""
     from dataclasses import replace
 
     from naoimitate.settings import Settings
@@ -78,7 +79,7 @@ def _settings(share: float) -> Any:
         head_speed=share * limits.head_speed,
         joint_share=share * limits.joint_share,
     )
-    return replace(usual, limits=slower)
+    return replace(usual, limits=slower, upper_body=upper_body)
 
 
 def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
