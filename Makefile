@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV ?= .venv
 INSTALLED = $(VENV)/.installed-by-make
 
-.PHONY: demo test run-tests clean
+.PHONY: demo test run-tests fuzz soak clean
 
 demo: $(INSTALLED)
 	$(VENV)/bin/naoimitate demo
@@ -13,6 +13,13 @@ test: $(INSTALLED) run-tests
 
 run-tests:
 	$(VENV)/bin/pytest -n auto
+
+# The long tests, at full size: minutes to half an hour.
+fuzz: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/fuzz.py
+
+soak: $(INSTALLED)
+	$(VENV)/bin/python benchmarks/soak.py
 
 $(INSTALLED): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
