@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from naoimitate.balance.leg_rows import differentiate, load_rows, make_tangent, place, sway_rows
+from naoimitate.balance.leg_rows import load_rows, sway_rows
 from naoimitate.balance.legs import POSE, LegLimits, Stance, build_legs, free_goal
+from naoimitate.balance.tangent import differentiate, make_tangent, place
 from naoimitate.core.geometry import quat_from_matrix
 from naoimitate.core.physics import GRAVITY
 from naoimitate.hw.compensation import GravityCompensation

@@ -6,24 +6,14 @@ slacks that soften the bounds of load, smoothness and sway: what cannot brake in
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from naoimitate.balance.legs import POSE, LegGoal, Legs, Stance, add_cross, base_pose, reduce_columns, table_bounds
+from naoimitate.balance.legs import POSE, LegGoal, Legs, Stance, reduce_columns, table_bounds
 from naoimitate.balance.retarget import Reach
-from naoimitate.robot.kernel import (
-    angular_jacobian,
-    center_of_mass,
-    composite_bodies,
-    forward,
-    joint_axes,
-    moment_jacobian,
-    momentum_of,
-    point_jacobian,
-)
+from naoimitate.balance.tangent import Tangent, beyond, cross, over_floor, turn_columns
+from naoimitate.robot.kernel import moment_jacobian, momentum_of
 from naoimitate.robot.model import Tree
 
 Array = npt.NDArray[np.float64]
@@ -36,139 +26,6 @@ TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
 SWAY_SCALE = (1.0, 1.0, 10.0, 10.0, 10.0, 50.0, 50.0, 50.0)
 """How the rows of sway, in m^2, m and rad, share their slack."""
-
-
-class Tangent(NamedTuple):
-    """The robot at one q, hung on its stance sole, and its derivatives by the n free variables.
-
-    pos, rot: link frames in the base frame. R, p: world from base. com, stance_at, other_at: (3,) m in the base frame.
-    other_rot: (3, 3) world. Columns (3, n) in the base frame, of the stance sole: at, turn (its motion in the base);
-    of the other sole: other, other_turn; of the CoM: com_raw; in the world, with the stance sole fixed: com_world,
-    other_world, other_world_turn; of the base origin over the floor, in base axes: base.
-    axes: (3, J) of all joints. bodies: (J + 1, 10), ``composite_bodies`` about the floor point ``about`` (3,) m in the
-    base frame. all_joints: (3, J) scratch.
-    """
-
-    pos: Array
-    rot: Array
-    R: Array
-    p: Array
-    com: Array
-    stance_at: Array
-    other_at: Array
-    other_rot: Array
-    at: Array
-    turn: Array
-    other: Array
-    other_turn: Array
-    com_raw: Array
-    base: Array
-    com_world: Array
-    other_world: Array
-    other_world_turn: Array
-    axes: Array
-    bodies: Array
-    about: Array
-    all_joints: Array
-
-
-@njit(cache=True)
-def make_tangent(joints: int, n: int) -> Tangent:
-    """Room for a robot of so many joints and n free variables."""
-    room = np.zeros((9, 3, n))
-    points = np.zeros((3, 3))
-    return Tangent(
-        np.empty((joints + 1, 3)),
-        np.empty((joints + 1, 3, 3)),
-        np.empty((3, 3)),
-        np.empty(3),
-        points[0],
-        points[1],
-        points[2],
-        np.empty((3, 3)),
-        room[0],
-        room[1],
-        room[2],
-        room[3],
-        room[4],
-        room[5],
-        room[6],
-        room[7],
-        room[8],
-        np.empty((3, joints)),
-        np.empty((joints + 1, 10)),
-        np.empty(3),
-        np.empty((3, joints)),
-    )
-
-
-@njit(cache=True)
-def place(tree: Tree, legs: Legs, stance: Stance, q: Array, t: Tangent) -> None:
-    """Fill the frames and points of t at q (J,) rad."""
-    forward(tree, q, t.pos, t.rot)
-    base_pose(tree, legs, stance, t.pos, t.rot, t.R, t.p)
-    center_of_mass(tree, t.pos, t.rot, t.com)
-    for foot, at in ((stance.side, t.stance_at), (1 - stance.side, t.other_at)):
-        row = legs.sole_joint[foot] + 1
-        at[:] = t.pos[row]
-        add_turned(t.rot[row], legs.sole_point[foot], at)
-    turn_columns(t.R, t.rot[legs.sole_joint[1 - stance.side] + 1], t.other_rot)
-
-
-@njit(cache=True)
-def differentiate(tree: Tree, legs: Legs, stance: Stance, floor: Array, t: Tangent) -> None:
-    """Fill the columns of t at the frames that ``place`` has left; floor: (3,) m in the world, for ``about``."""
-    s, o = legs.sole_joint[stance.side], legs.sole_joint[1 - stance.side]
-    J = t.all_joints
-    point_jacobian(tree, t.pos, t.rot, s, t.stance_at, J)
-    reduce_columns(J, legs, t.at)
-    angular_jacobian(tree, t.pos, t.rot, s, J)
-    reduce_columns(J, legs, t.turn)
-    point_jacobian(tree, t.pos, t.rot, o, t.other_at, J)
-    reduce_columns(J, legs, t.other)
-    angular_jacobian(tree, t.pos, t.rot, o, J)
-    reduce_columns(J, legs, t.other_turn)
-    t.about[:] = 0.0
-    add_turned(t.R.T, floor - t.p, t.about)
-    joint_axes(tree, t.rot, t.axes)
-    composite_bodies(tree, t.pos, t.rot, t.about, t.bodies)
-    for k in range(J.shape[1]):
-        u = _beyond(t, k)
-        J[0, k], J[1, k], J[2, k] = _cross(t.axes[0, k], t.axes[1, k], t.axes[2, k], u[0], u[1], u[2])
-    reduce_columns(J, legs, t.com_raw)
-    t.base[:] = 0.0
-    _over_floor(t, t.base, np.zeros(3))
-    moved = t.com_raw.copy()
-    _over_floor(t, moved, t.com)
-    turn_columns(t.R, moved, t.com_world)
-    moved[:] = t.other
-    _over_floor(t, moved, t.other_at)
-    turn_columns(t.R, moved, t.other_world)
-    moved[:] = t.other_turn
-    moved -= t.turn
-    turn_columns(t.R, moved, t.other_world_turn)
-
-
-@njit(cache=True)
-def _over_floor(t: Tangent, columns: Array, point: Array) -> None:
-    """Columns (3, n) of a point (3,) m in the base, plus what the base itself moves while the stance sole stays."""
-    columns -= t.at
-    add_cross(point - t.stance_at, t.turn, columns)
-
-
-@njit(cache=True)
-def turn_columns(R: Array, columns: Array, out: Array) -> None:
-    """out = R columns, (3, n)."""
-    for i in range(columns.shape[1]):
-        for a in range(3):
-            out[a, i] = R[a, 0] * columns[0, i] + R[a, 1] * columns[1, i] + R[a, 2] * columns[2, i]
-
-
-@njit(cache=True)
-def add_turned(R: Array, v: Array, out: Array) -> None:
-    """out += R v, (3,)."""
-    for a in range(3):
-        out[a] += R[a, 0] * v[0] + R[a, 1] * v[1] + R[a, 2] * v[2]
 
 
 @njit(cache=True)
@@ -211,22 +68,6 @@ def com_rows(t: Tangent, e_com: Array, slack: Array, C: Array, b: Array, row: in
 
 
 @njit(cache=True)
-def _cross(ax: float, ay: float, az: float, bx: float, by: float, bz: float) -> tuple[float, float, float]:
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-
-
-@njit(cache=True)
-def _beyond(t: Tangent, k: int) -> tuple[float, float, float]:
-    """First moment (3,) m about joint k of all that it moves, per total mass."""
-    m, s = t.bodies[k + 1, 0], t.bodies[k + 1]
-    return (
-        s[1] - m * (t.pos[k + 1, 0] - t.about[0]),
-        s[2] - m * (t.pos[k + 1, 1] - t.about[1]),
-        s[3] - m * (t.pos[k + 1, 2] - t.about[2]),
-    )
-
-
-@njit(cache=True)
 def load_rows(
     tree: Tree, legs: Legs, goal: LegGoal, t: Tangent, dt: float, most: Array, C: Array, b: Array, row: int
 ) -> int:
@@ -242,14 +83,14 @@ def load_rows(
             j = legs.loaded[leg, k]
             ax, ay, az = t.axes[0, j], t.axes[1, j], t.axes[2, j]
             lx, ly, lz = _carried(t, j, goal.share[leg])
-            cx, cy, cz = _cross(lx, ly, lz, ux, uy, uz)
+            cx, cy, cz = cross(lx, ly, lz, ux, uy, uz)
             lever = ax * cx + ay * cy + az * cz
             if most[leg, k] == 0.0:
                 left = legs.holds[leg, k] * goal.overload - abs(lever)
                 most[leg, k] = abs(lever) + max(left * min(1.0, LEVER_RATE * dt) if left > 0.0 else left, -LEVER_STEP)
             _load_row(tree, legs, goal.share[leg], t, j, C[row])
-            cx, cy, cz = _cross(ax, ay, az, lx, ly, lz)
-            cx, cy, cz = _cross(ux, uy, uz, cx, cy, cz)
+            cx, cy, cz = cross(ax, ay, az, lx, ly, lz)
+            cx, cy, cz = cross(ux, uy, uz, cx, cy, cz)
             for i in range(t.turn.shape[1]):
                 C[row, i] += cx * t.turn[0, i] + cy * t.turn[1, i] + cz * t.turn[2, i]
             row = _both_ways(C, b, row, -most[leg, k] - lever, most[leg, k] - lever)
@@ -261,7 +102,7 @@ def load_rows(
 @njit(cache=True)
 def _carried(t: Tangent, j: int, share: float) -> tuple[float, float, float]:
     """L (3,) m of ``load_rows`` for joint j."""
-    own, p = _beyond(t, j), t.pos[j + 1]
+    own, p = beyond(t, j), t.pos[j + 1]
     return share * (t.com[0] - p[0]) - own[0], share * (t.com[1] - p[1]) - own[1], share * (t.com[2] - p[2]) - own[2]
 
 
@@ -270,15 +111,15 @@ def _load_row(tree: Tree, legs: Legs, share: float, t: Tangent, j: int, out: Arr
     """Derivative of ``a . (L x up)`` for joint j by the free variables while the base stays, into out."""
     ux, uy, uz = t.R[2]
     ax, ay, az = t.axes[0, j], t.axes[1, j], t.axes[2, j]
-    sx, sy, sz = _cross(ux, uy, uz, ax, ay, az)
-    own, L = _beyond(t, j), _carried(t, j, share)
-    fx, fy, fz = _cross(L[0], L[1], L[2], ux, uy, uz)
-    hx, hy, hz = _cross(ax, ay, az, fx, fy, fz)
+    sx, sy, sz = cross(ux, uy, uz, ax, ay, az)
+    own, L = beyond(t, j), _carried(t, j, share)
+    fx, fy, fz = cross(L[0], L[1], L[2], ux, uy, uz)
+    hx, hy, hz = cross(ax, ay, az, fx, fy, fz)
     for i in range(legs.variable.shape[0]):
         v = legs.variable[i]
         if v < 0:
             continue
-        u = _beyond(t, i)
+        u = beyond(t, i)
         dx, dy, dz = share * u[0], share * u[1], share * u[2]
         turn_x, turn_y, turn_z = 0.0, 0.0, 0.0
         if tree.ancestor[i, j]:
@@ -288,7 +129,7 @@ def _load_row(tree: Tree, legs: Legs, share: float, t: Tangent, j: int, out: Arr
             dy -= share * (t.pos[j + 1, 1] - t.pos[i + 1, 1]) + own[1]
             dz -= share * (t.pos[j + 1, 2] - t.pos[i + 1, 2]) + own[2]
             turn_x, turn_y, turn_z = hx, hy, hz
-        cx, cy, cz = _cross(dx, dy, dz, sx, sy, sz)
+        cx, cy, cz = cross(dx, dy, dz, sx, sy, sz)
         out[v] += t.axes[0, i] * (cx + turn_x) + t.axes[1, i] * (cy + turn_y) + t.axes[2, i] * (cz + turn_z)
 
 
@@ -321,7 +162,7 @@ def _momentum_columns(legs: Legs, t: Tangent, out: Array) -> None:
     moment_jacobian(t.axes, t.pos, t.bodies, t.about, t.all_joints)
     K, way = np.zeros((3, n)), np.zeros((3, n))
     reduce_columns(t.all_joints, legs, K)
-    _over_floor(t, way, t.about)
+    over_floor(t, way, t.about)
     for i in range(n):
         kx, ky, kz = momentum_of(
             t.bodies[0], -t.turn[0, i], -t.turn[1, i], -t.turn[2, i], way[0, i], way[1, i], way[2, i]

@@ -16,23 +16,19 @@ import numpy.typing as npt
 from numba import njit
 
 from naoimitate.balance.leg_rows import (
-    Tangent,
-    add_turned,
     com_rows,
     count_rows,
-    differentiate,
     extra_rows,
     height_rows,
     joint_rows,
     load_rows,
-    make_tangent,
-    place,
     pose_rows,
     sway_rows,
     table_rows,
 )
 from naoimitate.balance.legs import POSE, REACH, LegGoal, Legs, LegWeights, Stance
 from naoimitate.balance.retarget import Reach
+from naoimitate.balance.tangent import Tangent, add_turned, differentiate, make_tangent, place
 from naoimitate.core.geometry import rotation_vector
 from naoimitate.ik import SOLVED, bounded_step, priced_step
 from naoimitate.robot.model import Tree

@@ -14,10 +14,9 @@ from naoimitate.cli import types
 if TYPE_CHECKING:
     from naoimitate.hw.driver import Driver
     from naoimitate.hw.guarded import GuardedDriver
-    from naoimitate.live.loop import Beat, Loop
+    from naoimitate.live.loop import Loop
     from naoimitate.live.session import Session
     from naoimitate.robot.model import RobotModel
-    from naoimitate.run.journal import Journal
 
 DRIVERS = ("mujoco", "can", "none")
 
@@ -99,6 +98,7 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
 
 def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options: dict[str, Any]) -> None:
     """The session with a stream from the network."""
+    from naoimitate.cli.run_writer import Writer
     from naoimitate.core.errors import StreamError
     from naoimitate.live.loop import Loop
     from naoimitate.live.protocols.registry import PROTOCOLS
@@ -165,6 +165,7 @@ def _replay(path: Path, session: Session, driver: GuardedDriver, robot: RobotMod
     """A recorded session again, with the times and the commands of then."""
     import time
 
+    from naoimitate.cli.run_writer import Writer
     from naoimitate.core.errors import StreamError
     from naoimitate.live.loop import Beat
     from naoimitate.live.protocols.registry import PROTOCOLS
@@ -213,51 +214,3 @@ def _passed(driver: GuardedDriver) -> str:
     status = driver.status
     refused = ", ".join(f"{count} {reason}" for reason, count in sorted(status.refused.items())) or "none refused"
     return f"{status.accepted} commands passed the gate; {refused}; the robot: {status.condition.value}"
-
-
-class Writer:
-    """The run files of a session: a new one with every calibration."""
-
-    def __init__(self, out: Path | None, session: Session, robot: RobotModel, source: str) -> None:
-        self._out, self._session, self._robot, self._source = out, session, robot, source
-        self._journal: Journal | None = None
-        self._begin: float | None = None
-        self._written: list[str] = []
-        self._count = 0
-
-    def take(self, beat: Beat) -> None:
-        """One turn of the loop."""
-        if self._out is None:
-            return
-        self._begin = beat.now if self._begin is None else self._begin
-        if beat.tick.began or (self._journal is None and beat.tick.fresh):
-            self._next()
-        if self._journal is not None:
-            tick = beat.tick
-            self._journal.add(tick.command, tick.arrival - self._begin, tick.state.value, beat.latency, beat.step_time)
-
-    def close(self) -> list[str]:
-        """Finish the last run file; a line for each."""
-        self._finish()
-        return self._written
-
-    def _next(self) -> None:
-        from naoimitate.run.columns import constants
-        from naoimitate.run.journal import Journal
-        from naoimitate.run.provenance import provenance
-
-        assert self._out is not None
-        self._finish()
-        self._count += 1
-        name = self._out.name if self._count == 1 else f"{self._out.stem}-{self._count}{self._out.suffix}"
-        imitator = self._session.imitator
-        text = provenance(imitator.settings, source_sha256="", seed=0, speed="live")
-        fixed = constants(self._robot, imitator.mapping, imitator.settings.retarget, self._source, text)
-        self._journal = Journal(self._out.with_name(name), fixed)
-
-    def _finish(self) -> None:
-        if self._journal is not None:
-            run = self._journal.close()
-            if run is not None:
-                self._written.append(f"{self._journal.out}: {len(run)} frames, {run.duration:.2f} s")
-            self._journal = None

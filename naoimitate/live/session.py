@@ -107,9 +107,11 @@ class Session:
         for frame, support in ((self._tpose, "D"), (self._still, "L"), (self._still, "D")):
             for _ in range(100):
                 self.imitator.step(frame, 0.05, support=support)
-        warm = LandmarkFilter()
-        for k in range(3):
-            warm.step(replace(self._still, time=0.01 * k))
+        warm, watch = LandmarkFilter(), TPoseWatch()
+        for k in range(20):
+            seen = warm.step(replace(self._tpose, time=0.01 * k, support=None))
+            self.imitator.step(warm.predicted(0.01 * k + 0.005, seen), 0.01)
+            watch.see(seen)
 
     def start(self) -> None:
         """The robot stands in its posture ``stand``, connected."""
