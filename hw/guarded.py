@@ -97,8 +97,8 @@ class GuardedDriver:
         self._latch = FallLatch(self._settings.fall)
         self._ended = threading.Lock()
         self._condition, self._problem = Condition.OFF, ""
-        self._accepted, self._refused, self._refusing = 0, Counter[str](), ()
-        self._refusing: tuple[str, ...]
+        self._accepted, self._refused = 0, Counter[str]()
+        self._refusing: tuple[str, ...] = ()
         self._alarms: tuple[str, ...] = ()
         self._command: RobotCommand | None = None
         self._passed = self._checked = self._sensed = self._alarmed = 0.0

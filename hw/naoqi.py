@@ -195,7 +195,8 @@ class NaoqiDriver:
             with contextlib.suppress(DriverError):  # a robot that is gone shows in ``read``
                 self._send(link)
                 if asked is not None and all(future.done() for future in asked):
-                    asked = self._take(*asked)
+                    self._take(*asked)
+                    asked = None
                 if asked is None:
                     sensed = link.ask("ALMotion", "getAngles", self._names, True)
                     asked = sensed, link.ask("ALMemory", "getListData", self._keys)

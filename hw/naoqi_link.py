@@ -85,8 +85,9 @@ class NaoqiLink:
         except subprocess.TimeoutExpired:
             self._child.kill()
             self._child.wait()
-        if not self._child.stdin.closed:
-            self._child.stdin.close()
+        self._pipe = -1  # its number may soon be that of another file
+        assert self._child.stdin is not None
+        self._child.stdin.close()
 
     def _request(self, what: dict[str, Any]) -> Future[Any]:
         number, future = next(self._numbers), Future[Any]()
