@@ -14,17 +14,12 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError, NaoimitateError
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.fsm.fall_latch import Action, FallLatch, FallLimits
 from naoimitate.hw.driver import Driver, RobotState
-from naoimitate.hw.lean import lean
-
-UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-"""Where the torso is meant to be before the first command."""
+from naoimitate.hw.lean import UPRIGHT, lean
 
 NOT_LIVE = "not live"
 """Why a command is refused before ``connect`` and after the end."""
@@ -102,8 +97,8 @@ class GuardedDriver:
         self._latch = FallLatch(self._settings.fall)
         self._ended = threading.Lock()
         self._condition, self._problem = Condition.OFF, ""
-        self._accepted, self._refused, self._refusing = 0, Counter[str](), ()
-        self._refusing: tuple[str, ...]
+        self._accepted, self._refused = 0, Counter[str]()
+        self._refusing: tuple[str, ...] = ()
         self._alarms: tuple[str, ...] = ()
         self._command: RobotCommand | None = None
         self._passed = self._checked = self._sensed = self._alarmed = 0.0

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from naoimitate.core.frames import Array
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+"""Where a torso is meant to be before the first command."""
 
 
 def up_from_quat(quat: Array) -> tuple[float, float, float]:

@@ -1,0 +1,250 @@
+"""A real NAO through NAOqi: the newest command every 20 ms, its senses likewise, and a safe start and end.
+
+The fastest call that is safe beside NAOqi's reflexes is ``ALMotion.setAngles``: it does not block, and ALMotion runs at
+20 ms. The fraction of the maximum speed that it takes is chosen so that the largest step just takes a period: less lags
+behind, more jerks from step to step.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from naoimitate.calib.zeros import JointZeros, no_zeros
+from naoimitate.core.errors import DriverError
+from naoimitate.core.frames import SIDES, Array, RobotCommand
+from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.driver import RobotState
+from naoimitate.hw.lean import UPRIGHT
+from naoimitate.hw.naoqi_link import NaoqiLink
+from naoimitate.hw.naoqi_senses import accelerometer_sign, blank, keys, state
+from naoimitate.hw.naoqi_start import (
+    ON_ITS_FEET,
+    check_body,
+    check_posture,
+    check_version,
+    keep_reflexes,
+    posture_family,
+    quieten,
+    wake,
+)
+from naoimitate.robot.model import RobotModel
+
+HEADROOM = 1.2
+"""The step is done in 1 / HEADROOM of the period: room for a tick that comes early."""
+
+MIN_FRACTION, MAX_FRACTION = 0.01, 1.0
+"""Of the maximum speed; ALMotion refuses 0."""
+
+HAND_STEP, HAND_FRACTION = 0.05, 0.5
+"""A hand is moved when its opening (0 to 1) has changed by so much, at this fraction of its speed."""
+
+SILENCE = 0.5
+"""[s] without an answer after which the robot is said not to answer; ten times its slowest call on a busy network."""
+
+
+@dataclass(frozen=True)
+class NaoqiSettings:
+    """How to reach a NAO, and how to move it."""
+
+    url: str = "tcp://nao.local:9559"
+    """Address; robots with NAOqi 2.9 ask for tcps://HOST:9503, user and password."""
+    user: str = ""
+    password: str = ""
+    patience: float = 5.0
+    """[s] to wait for an answer before the start."""
+    period: float = 0.02
+    """[s] of ALMotion."""
+    stiffness: float = 1.0
+    """Share of the servos' stiffness while the robot imitates."""
+    ramp: float = 1.5
+    """[s] from no stiffness to the full one."""
+    stand_speed: float = 0.5
+    """Share of the speed with which it stands up."""
+    servo_stiffness: float | None = None
+    """[N m/rad] of the servos, for gravity compensation; None = none, since nobody publishes it: measure it first."""
+
+
+class NaoqiDriver:
+    """One NAO. ``notice`` is told, a sentence each, what was changed on the robot."""
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        settings: NaoqiSettings | None = None,
+        *,
+        zeros: JointZeros | None = None,
+        notice: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        self._robot, self._settings = robot, settings or NaoqiSettings()
+        self._zeros, self._notice = zeros or no_zeros(robot), notice
+        self._names, self._keys = list(robot.joint_names), keys(robot.joint_names)
+        self._hands = [robot.data["hands"][side] for side in SIDES] if "hands" in robot.data else []
+        self._compensation = GravityCompensation(robot) if self._settings.servo_stiffness else None
+        self._link: NaoqiLink | None = None
+        self._thread: threading.Thread | None = None
+        self._halt, self._stopping = threading.Event(), threading.RLock()
+        self._state = blank(len(self._names), robot.postures["stand"])
+        self._target: RobotCommand | None = None
+        self._began = time.monotonic()
+
+    @property
+    def period(self) -> float:
+        """Time between two uses of the newest command, s."""
+        return self._settings.period
+
+    def connect(self) -> None:
+        """Find the robot, check it, wake it up and let it stand. Takes some seconds; DriverError says what to do."""
+        self.stop()
+        s = self._settings
+        link = NaoqiLink(s.url, s.user, s.password, s.patience)
+        try:
+            check_version(link)
+            check_body(link, self._names)
+            check_posture(link)
+            quieten(link, self._notice)
+            keep_reflexes(link, self._notice)
+        except DriverError:
+            link.close()
+            raise
+        self._link, self._halt = link, threading.Event()  # from here on ``stop`` has something to stop
+        try:
+            wake(link, s.stiffness, s.ramp, s.stand_speed)
+            self._start_from(link)
+        except DriverError:
+            self.stop()
+            raise
+        self._thread = threading.Thread(target=self._run, args=(link, self._halt), name="naoqi", daemon=True)
+        self._thread.start()
+
+    def read(self) -> RobotState:
+        """The newest state that the robot has sent, with an alarm where it has not for a while.
+
+        Raises DriverError when the connection has broken.
+        """
+        newest, link = self._state, self._link
+        if link is None:
+            return newest
+        if not link.open:
+            raise DriverError("the connection to the robot broke; it holds its last posture: go and look after it")
+        silent = self._now() - newest.time
+        if silent < SILENCE:
+            return newest
+        return replace(newest, alarms=(*newest.alarms, f"the robot has not answered for {silent:.1f} s"))
+
+    def write(self, command: RobotCommand) -> None:
+        """Replace the command that is sent from the next period on; after ``stop`` it leads to nothing."""
+        self._target = command
+
+    def soften(self, share: float) -> None:
+        """Turn the stiffness down to a share, 0 to 1, of its setting, without waiting for the robot."""
+        if self._link is not None:
+            self._link.ask("ALMotion", "setStiffnesses", "Body", float(share * self._settings.stiffness))
+
+    def stop(self) -> None:
+        """Send nothing more; on its feet the robot crouches and rests, otherwise its servos go off as it lies."""
+        with self._stopping:
+            link, self._link = self._link, None
+            self._halt.set()
+            if self._thread is not None:
+                self._thread.join(2.0)
+                self._thread = None
+            if link is None:
+                return
+            with contextlib.suppress(DriverError):  # what follows ends all motion as well
+                link.call("ALMotion", "killAll", patience=2.0)
+            try:
+                self._let_go(link)
+            except DriverError:
+                if link.open:  # else it is gone and cannot be told: ``read`` has said so
+                    raise
+            finally:
+                link.close()
+
+    def _let_go(self, link: NaoqiLink) -> None:
+        """Crouch and rest, which takes some seconds, or go limp where the robot lies already."""
+        if posture_family(link) in ON_ITS_FEET and not self._state.fell:
+            link.call("ALMotion", "rest", patience=20.0)
+        else:
+            link.call("ALMotion", "setStiffnesses", "Body", 0.0)
+
+    def _start_from(self, link: NaoqiLink) -> None:
+        """The robot's first state, its speeds, and no target."""
+        self._began, self._target = time.monotonic(), None
+        limits = link.call("ALMotion", "getLimits", "Body")
+        by_name = dict(zip(link.call("ALMotion", "getBodyNames", "Body"), limits, strict=True))
+        self._speed = np.array([by_name[name][2] for name in self._names], dtype=np.float64)
+        values = link.call("ALMemory", "getListData", self._keys)
+        self._upright = accelerometer_sign(values)
+        servos = link.call("ALMotion", "getAngles", self._names, True)
+        self._state = self._sensed(servos, values)
+        self._sent, self._opening = np.array(servos, dtype=np.float64), np.full(2, np.nan)
+
+    def _run(self, link: NaoqiLink, halt: threading.Event) -> None:
+        """The robot's period: send, ask, and take the answers to what was asked before."""
+        asked: tuple[Future[Any], Future[Any]] | None = None
+        due = time.monotonic()
+        while not halt.is_set() and link.open:
+            with contextlib.suppress(DriverError):  # a robot that is gone shows in ``read``
+                self._send(link)
+                if asked is not None and all(future.done() for future in asked):
+                    self._take(*asked)
+                    asked = None
+                if asked is None:
+                    sensed = link.ask("ALMotion", "getAngles", self._names, True)
+                    asked = sensed, link.ask("ALMemory", "getListData", self._keys)
+            due = max(due + self.period, time.monotonic())
+            halt.wait(max(0.0, due - time.monotonic()))
+
+    def _take(self, angles: Future[Any], values: Future[Any]) -> None:
+        """A new state from two answers; where one failed, the old state stays and grows old."""
+        if angles.exception() is None and values.exception() is None:
+            self._state = self._sensed(angles.result(), values.result())
+
+    def _sensed(self, servos: Any, values: Any) -> RobotState:
+        planned = UPRIGHT if self._target is None else self._target.base_quat
+        return state(self._now(), servos, values, self._names, self._zeros, self._upright, planned)
+
+    def _send(self, link: NaoqiLink) -> None:
+        """The newest command, as servo angles, if there is something new in it."""
+        command = self._target
+        if command is None:
+            return
+        servos = self._servos(command)
+        step = np.abs(servos - self._sent)
+        if step.any():
+            link.ask("ALMotion", "setAngles", self._names, servos.tolist(), self._fraction(step))
+            self._sent = servos
+        self._send_hands(link, command)
+
+    def _servos(self, command: RobotCommand) -> Array:
+        """Servo angles (J,) rad: with what gravity takes, where asked for, and the specimen's zeros; in range."""
+        q = command.q
+        if self._compensation is not None and self._settings.servo_stiffness:
+            kp = self._settings.servo_stiffness * self._settings.stiffness
+            q = self._compensation.command(q, command.base_quat, command.support, kp)
+        return np.clip(self._zeros.to_servos(q), self._robot.lower, self._robot.upper)
+
+    def _fraction(self, step: Array) -> float:
+        """Fraction of the maximum speed with which the largest step (J,) rad takes a period."""
+        needed = HEADROOM * float((step / self._speed).max()) / self.period
+        return min(max(needed, MIN_FRACTION), MAX_FRACTION)
+
+    def _send_hands(self, link: NaoqiLink, command: RobotCommand) -> None:
+        if not self._hands or command.hand_opening is None:
+            return
+        for side, name in enumerate(self._hands):
+            opening, was = float(command.hand_opening[side]), float(self._opening[side])
+            if opening == opening and not abs(opening - was) < HAND_STEP:
+                link.ask("ALMotion", "setAngles", [name], [opening], HAND_FRACTION)
+                self._opening[side] = opening
+
+    def _now(self) -> float:
+        return time.monotonic() - self._began
