@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from naoimitate.live.session import Session
     from naoimitate.robot.model import RobotModel
 
-DRIVERS = ("mujoco", "can", "none")
+DRIVERS = ("mujoco", "can", "naoqi", "none")
 
 
 @click.command()
@@ -30,6 +30,7 @@ DRIVERS = ("mujoco", "can", "none")
 @click.option("--can-interface", default="socketcan", show_default=True, help="Of the CAN bus, as python-can has it.")
 @click.option("--can-channel", default="can0", show_default=True, help="Of the CAN bus.")
 @click.option("--can-codec", type=click.Choice(["dbc"]), default="dbc", show_default=True, help="What motors speak.")
+@click.option("--url", default="tcp://nao.local:9559", show_default=True, help="Of a real NAO, for --driver naoqi.")
 @click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
@@ -91,6 +92,10 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
 
         names = {key: options[f"can_{key}"] for key in ("interface", "channel", "codec")}
         return CanDriver(robot, **names)
+    if options["driver"] == "naoqi":
+        from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings
+
+        return NaoqiDriver(robot, NaoqiSettings(url=options["url"]), notice=click.echo)
     from naoimitate.sim.driver import MujocoDriver
 
     return MujocoDriver(robot)
