@@ -136,8 +136,10 @@ def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options:
         receiver.close()
         if recorder is not None:
             recorder.close()
-        for line in (*writer.close(), _summary(stream), _passed(driver)):
-            click.echo(line)
+        lines = writer.close()
+        if stream.counts.datagrams:
+            lines += [_summary(stream), _passed(driver)]
+        click.echo("\n".join(lines), nl=bool(lines))
 
 
 def _run(loop: Loop, duration: float) -> None:
@@ -199,8 +201,10 @@ def _replay(path: Path, session: Session, driver: GuardedDriver, robot: RobotMod
         click.echo("ended by the operator", err=True)
     finally:
         driver.stop()
-        for line in (*writer.close(), _summary(stream), _passed(driver)):
-            click.echo(line)
+        lines = writer.close()
+        if stream.counts.datagrams:
+            lines += [_summary(stream), _passed(driver)]
+        click.echo("\n".join(lines), nl=bool(lines))
 
 
 def _texts(options: dict[str, Any]) -> dict[str, str]:
