@@ -1,1 +1,1 @@
-"""Calibration: the T-pose of a person, subject files."""
+"""Calibration: the T-pose of a person, subject files; joint zeros of a robot."""

@@ -1,1 +1,1 @@
-"""Drivers of robots, and what is theirs to do: servo gravity compensation."""
+"""Drivers of robots, the guard that stands before each of them, and what is theirs to do: servo compensation."""
