@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from naoimitate.core.frames import HumanFrame, RobotCommand
+from naoimitate.core.frames import LANDMARK, HumanFrame, RobotCommand
 from naoimitate.fsm.session import State
 from naoimitate.live.session import Session, SessionSettings, Tick
 from naoimitate.motion.builtin import builtin_motion, tpose
@@ -171,3 +171,18 @@ def test_the_mirrored_operator_lifts_the_other_foot(nao: RobotModel) -> None:
     plain, mirrored = play(nao, 9.0), play(nao, 9.0, live=SessionSettings(mirror=True))
     feet = [next(c.support for c in story.commands() if c.support != "D") for story in (plain, mirrored)]
     assert set(feet) == {"L", "R"}
+
+
+def test_the_fourteen_landmarks_that_imitation_needs_are_enough(nao: RobotModel) -> None:
+    def person(time: float) -> HumanFrame | None:
+        frame = operator(time)
+        assert frame is not None
+        landmarks = frame.landmarks.copy()
+        for name in ("pelvis", "chest", "head", "l_hand", "r_hand"):
+            landmarks[LANDMARK[name]] = np.nan
+        return replace(frame, landmarks=landmarks, orientations=None)
+
+    story = play(nao, 9.0, person)
+    assert story.states() == ["calibrating", "blending", "tracking"]
+    assert {c.support for c in story.commands()} >= {"D", "L"}
+    assert_smooth(nao, story)
