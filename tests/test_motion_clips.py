@@ -140,3 +140,11 @@ def test_walks_look_ahead_and_stand_upright() -> None:
         w, x, y, z = np.median(load(file).orientations, axis=0).T
         pitch = np.degrees(np.arcsin(np.clip(2 * (w * y - x * z), -1, 1)))
         assert np.abs(pitch[[SEGMENT[s] for s in ("pelvis", "chest", "head")]]).max() < 15.0
+
+
+def test_hands_and_toes_are_near_wrists_and_ankles(clip: dict[str, Any]) -> None:
+    p = load(clip["file"]).landmarks
+    for side in "lr":
+        for near, far in (("wrist", "hand"), ("ankle", "toe")):
+            way = p[:, LANDMARK[f"{side}_{far}"]] - p[:, LANDMARK[f"{side}_{near}"]]
+            assert np.linalg.norm(way, axis=1).max() < 0.3

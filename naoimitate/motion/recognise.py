@@ -20,6 +20,8 @@ POSTURES = 50
 """So many postures of a recording are enough to tell left from right."""
 SHORT = 0.02
 """Bones below this share of a leg have no direction."""
+EXTREMITY = 0.5
+"""Legs beyond which no knuckle and no ball is from its wrist or ankle: helpers of a rig hang there."""
 TOES = 0.25
 """What is beyond the ball of a foot by more than this share of a leg is no toe (CMU's skeletons: 0.08)."""
 
@@ -132,9 +134,9 @@ def _extremities(skeleton: Skeleton, words: list[tuple[str, str]], side: str, no
     found = {}
     for vocabulary, name, above in ((HANDS + KNUCKLES, "hand", "wrist"), (PARTS["toe"], "toe", "ankle")):
         start = nodes[f"{side}_{above}"]
-        short = SHORT * leg_length(skeleton, nodes)
+        leg = leg_length(skeleton, nodes)
         far = {i: bone_length(skeleton, start, i) for i in skeleton.below(start)}
-        below = [i for i, distance in far.items() if distance > short]
+        below = [i for i, distance in far.items() if SHORT * leg < distance < EXTREMITY * leg]
         named = [i for i in below if words[i][0] in (side, "") and words[i][1] in vocabulary]
         ends = [i for i in below if skeleton.ends[i] and _only_way(skeleton, start, i)]
         choice = named or ends
