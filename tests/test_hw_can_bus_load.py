@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from naoimitate.core.errors import DriverError
@@ -37,6 +37,7 @@ def _bits(value: int, count: int) -> list[int]:
     return [value >> i & 1 for i in range(count - 1, -1, -1)]
 
 
+@settings(deadline=None)
 @given(st.integers(0, 0x7FF), st.binary(max_size=8))
 def test_no_frame_is_longer_than_its_worst_length(identifier: int, data: bytes) -> None:
     assert stuffed_length(identifier, data) <= frame_bits(len(data))
@@ -70,6 +71,7 @@ def test_a_bus_that_is_too_full_is_refused_with_a_rate_that_fits(nao: RobotModel
     CanDriver(nao, channel="unused", compensation=False, **{**options, "period": 1.0 / rate})  # type: ignore[arg-type]
 
 
+@settings(deadline=None)
 @given(st.integers(1, 60), st.floats(10.0, 1000.0))
 def test_everything_over_eighty_percent_and_nothing_under_it_is_refused(motors: int, rate: float) -> None:
     traffic = [Traffic(8, False, rate)] * motors

@@ -9,7 +9,7 @@ import cantools
 import numpy as np
 import pytest
 from crccheck.crc import Crc8SaeJ1850
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from naoimitate.core.errors import DriverError
@@ -28,6 +28,7 @@ def test_the_checksum_of_the_standard_string_is_that_of_the_catalogue() -> None:
     assert crc8(int.from_bytes(b"12", "little"), b"3456789") == 0x4B
 
 
+@settings(deadline=None)
 @given(st.integers(0, 0x7FF), st.binary(max_size=7))
 def test_the_checksum_is_that_of_an_independent_library(identifier: int, data: bytes) -> None:
     assert crc8(identifier, data) == Crc8SaeJ1850.calc(identifier.to_bytes(2, "little") + data)
@@ -49,6 +50,7 @@ def feedback(node: int = 1, **values: float | str) -> can.Message:
     return can.Message(arbitration_id=layout.frame_id, is_extended_id=False, data=data)
 
 
+@settings(deadline=None)
 @given(
     st.lists(st.floats(-6.55, 6.55), min_size=25, max_size=25),
     st.floats(0.0, 65.0),
@@ -67,6 +69,7 @@ def test_commands_carry_their_targets_within_half_a_step(position: list[float], 
         assert frame.data[-1] == Crc8SaeJ1850.calc(frame.arbitration_id.to_bytes(2, "little") + frame.data[:-1])
 
 
+@settings(deadline=None)
 @given(
     st.sampled_from(list(NODES)),
     st.floats(-6.55, 6.55),
@@ -96,6 +99,7 @@ def test_feedback_is_read_within_half_a_step(
     assert np.all(errors <= np.array([0.0001, 0.005, 0.0025, 0.5]) + 1e-9)
 
 
+@settings(deadline=None)
 @given(st.floats(allow_nan=False), st.floats(allow_nan=False), st.floats(allow_nan=False))
 def test_targets_beyond_what_a_frame_can_carry_are_clipped_and_never_wrap(p: float, v: float, k: float) -> None:
     frame = CODEC.command(Targets(np.full(25, p), np.full(25, v), np.full(25, k)))[0]
@@ -105,6 +109,7 @@ def test_targets_beyond_what_a_frame_can_carry_are_clipped_and_never_wrap(p: flo
     assert abs(values["stiffness"] - np.clip(k, 0.0, 1.0)) <= 0.004
 
 
+@settings(deadline=None)
 @given(st.integers(0, 63), st.integers(1, 0xFF))
 def test_every_burst_of_up_to_eight_wrong_bits_is_found(place: int, burst: int) -> None:
     message = feedback(7, position=1.234, speed=-3.0, counter=9)
@@ -124,6 +129,7 @@ def test_a_frame_that_reaches_us_under_another_identifier_is_damaged() -> None:
         CODEC.decode(message)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 0x1FFFFFFF), st.booleans(), st.binary(max_size=8))
 def test_no_frame_of_the_bus_raises_anything_but_a_corrupt_frame(identifier: int, extended: bool, data: bytes) -> None:
     identifier = identifier if extended else identifier & 0x7FF

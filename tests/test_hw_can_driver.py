@@ -223,6 +223,30 @@ def test_softening_is_immediate_and_stiffening_slow(nao: RobotModel) -> None:
         assert max(np.diff(shares)) <= 0.1
 
 
+def test_a_robot_that_was_softened_is_let_go_from_there_and_never_stiffer(nao: RobotModel) -> None:
+    with rig(nao, compensation=False) as it:
+        it.driver.connect()
+        it.frames()
+        it.driver.soften(0.4)
+        it.driver.stop()
+        time.sleep(0.03)
+        shares = [v["stiffness"] for _, v in commands_to(it.frames(), 11)]
+        assert all(share <= 0.4 for share in shares[shares.index(0.4) :]) and 0.4 in shares[:4]
+
+
+def test_after_an_emergency_stop_the_robot_is_let_down_where_it_is(nao: RobotModel) -> None:
+    with rig(nao, compensation=False) as it:
+        it.driver.connect()
+        it.driver.write(command(nao, nao.postures["Crouch"]))
+        time.sleep(0.05)
+        it.driver.emergency_stop()
+        time.sleep(0.05)
+        held = positions(it)
+        it.driver.stop()
+        assert positions(it) == held
+        assert wait_for(lambda: {(m.status, m.stiffness) for m in it.stub.motors.values()} == {("off", 0.0)})
+
+
 def test_write_never_waits_and_refuses_nan(nao: RobotModel) -> None:
     with rig(nao) as it:
         it.driver.connect()

@@ -136,7 +136,8 @@ def test_a_motor_whose_fault_stays_is_named(nao: RobotModel) -> None:
 @pytest.mark.parametrize(
     ("interface", "channel", "raised", "message"),
     [
-        ("nonsense", "x", None, "the CAN interface 'nonsense' cannot be used"),
+        ("nonsense", "x", None, "there is no CAN interface 'nonsense': give one of"),
+        ("udp_multicast", "239.0.0.1", can.CanInterfaceNotImplementedError("no msgpack"), r"naoimitate\[can-udp\]"),
         ("socketcan", "", None, "which CAN bus"),
         ("socketcan", "can0", OSError(97, "Address family not supported"), "this kernel has no SocketCAN"),
         ("socketcan", "can7", OSError(19, "No such device"), "there is no CAN channel 'can7' of socketcan"),

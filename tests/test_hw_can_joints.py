@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from naoimitate.calib.zeros import JointZeros
@@ -42,6 +42,7 @@ def test_every_joint_and_hand_of_the_robot_has_a_motor_and_a_shared_motor_has_on
     assert [joints.names[hand] for hand in joints.hands if hand is not None] == ["LHand", "RHand"]
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.sampled_from([1, -1]), st.floats(0.1, 200.0), st.floats(-1.0, 1.0))
 def test_joint_angles_survive_the_way_to_the_motors_and_back(seed: int, sign: int, gear: float, zero: float) -> None:
     joints = read_joint_map(changed(NAO, "joints", "LKneePitch", sign=sign, gear=gear, zero=zero))
@@ -92,6 +93,7 @@ def test_a_map_that_cannot_be_meant_is_refused(robot: RobotModel, message: str) 
     assert "\n" not in str(error.value)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_the_setpoint_never_runs_and_never_leaves_its_range_and_gets_there(seed: int) -> None:
     rng = np.random.default_rng(seed)

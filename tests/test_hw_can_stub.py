@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import signal
 import subprocess
 import sys
 import time
@@ -16,7 +17,7 @@ import pytest
 from can_rig import QUICK, command, wait_for
 from click.testing import CliRunner
 from crccheck.crc import Crc8SaeJ1850
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import naoimitate.hw.can.stub as stub_module
@@ -40,6 +41,7 @@ def test_it_shares_no_code_with_the_driver_and_its_codec() -> None:
                 assert node.module.startswith("naoimitate.hw.can.stub"), (name, node.module)
 
 
+@settings(deadline=None)
 @given(st.lists(st.tuples(st.floats(-2.0, 2.0), st.floats(0.0, 10.0), st.floats(0.001, 0.08)), min_size=1, max_size=40))
 def test_a_motor_never_turns_faster_than_commanded_or_possible(path: list[tuple[float, float, float]]) -> None:
     motor, now = StubMotor(0.0, 6.0), 0.0
@@ -54,6 +56,7 @@ def test_a_motor_never_turns_faster_than_commanded_or_possible(path: list[tuple[
         motor.command("follow", target, limit, 1.0, now)
 
 
+@settings(deadline=None)
 @given(st.floats(0.0, 3.0), st.booleans(), st.integers(1, 30))
 def test_a_motor_without_commands_or_heartbeat_holds_after_a_tenth_of_a_second(
     silence: float, heartbeat: bool, looks: int
@@ -173,11 +176,22 @@ def test_the_command_says_ready_and_ends_after_its_duration() -> None:
     assert result.output.startswith("ready: 25 motors of nao on virtual cli\n")
 
 
+def test_an_interrupted_command_leaves_without_a_traceback() -> None:
+    arguments = ["can-stub", "--interface", "virtual", "--channel", "cli"]
+    program = [sys.executable, "-m", "naoimitate.cli", *arguments]
+    stub = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert stub.stdout is not None and stub.stdout.readline().startswith("ready")
+    stub.send_signal(signal.SIGINT)
+    output, errors = stub.communicate(timeout=10.0)
+    assert stub.returncode == 130
+    assert "0 damaged" in output and errors.strip() == "naoimitate: interrupted"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--fault", "HeadYaw:lazy@1"], "unknown kind 'lazy'"),
-        (["--interface", "nonsense"], "'nonsense' cannot be used"),
+        (["--interface", "nonsense"], "no CAN interface 'nonsense'"),
         (["--database", "/nowhere/can.dbc"], "/nowhere/can.dbc cannot be read"),
     ],
 )

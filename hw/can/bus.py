@@ -22,13 +22,18 @@ def open_bus(interface: str, channel: str, bitrate: int) -> can.BusABC:
     try:
         return can.Bus(interface=interface, channel=channel, bitrate=bitrate)
     except can.CanInterfaceNotImplementedError as error:
-        known = ", ".join(sorted(can.VALID_INTERFACES))
-        raise DriverError(
-            f"the CAN interface {interface!r} cannot be used ({_line(error)}): install what it needs, "
-            f"or take one of {known}"
-        ) from error
+        raise DriverError(_unusable(interface, error)) from error
     except Exception as error:  # the backends raise whatever their drivers' libraries do
         raise DriverError(_reason(interface, channel, bitrate, error)) from error
+
+
+def _unusable(interface: str, error: Exception) -> str:
+    if interface not in can.VALID_INTERFACES:
+        return f"there is no CAN interface {interface!r}: give one of {', '.join(sorted(can.VALID_INTERFACES))}"
+    needs = (
+        "pip install naoimitate[can-udp]" if interface == "udp_multicast" else "install what python-can names for it"
+    )
+    return f"the CAN interface {interface!r} cannot be used here ({_line(error)}): {needs}"
 
 
 def _reason(interface: str, channel: str, bitrate: int, error: Exception) -> str:

@@ -112,8 +112,7 @@ class CanDriver:
         """Find every motor, switch on where the robot is, and raise the stiffness; returns when it is up.
 
         A robot that still holds itself, because its last host died, keeps its stiffness. After an emergency stop the
-        motors are off for a moment: hold the robot. Raises
-        DriverError when the bus or a motor cannot be used.
+        motors are off for a moment: hold the robot. Raises DriverError when the bus or a motor cannot be used.
         """
         self.stop()
         self._health = Health(self._map)
@@ -185,7 +184,12 @@ class CanDriver:
         startup.clear()
         self._share, self._wanted, self._emergency = float(standing), 1.0, False
         self._target = self._led = None
-        startup.switch_on(self._targets)
+        try:
+            startup.switch_on(self._targets)
+        except BaseException:
+            if not standing:  # some may follow already, without stiffness
+                link.send(self._codec.disable())
+            raise
         start = self._map.from_motor(link.position)
         speed = self._map.speed * self._settings.speed
         self._setpoint = Setpoint(start, self._map.lower, self._map.upper, speed)
@@ -247,6 +251,7 @@ class CanDriver:
     def _rest(self, link: Link) -> None:
         """Hold where the motors were sent last while the stiffness goes down, then switch them off."""
         position = self._map.to_motor(self._setpoint.angles)
+        self._share = min(self._share, self._wanted)
         last = time.monotonic()
         while self._share > 0.0:
             link.send([*self._codec.heartbeat(), *self._codec.command(self._targets(position))])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -38,7 +38,8 @@ class Health:
     def __init__(self, joint_map: JointMap) -> None:
         self._map = joint_map
         motors = len(joint_map)
-        self.counts = Counts()
+        self._received = self._damages = self._lost = self._errors = 0  # the receiving thread's
+        self._unsent = 0  # the sending thread's
         self.seen = np.full(motors, -np.inf)
         self.status = [MotorStatus.OFF] * motors
         self._temperature = np.full(motors, np.nan)
@@ -47,11 +48,17 @@ class Health:
         self._near = np.full(motors, np.inf)
         self._troubles: dict[str, float] = {}
 
+    @property
+    def counts(self) -> Counts:
+        """Frames until now."""
+        return Counts(self._received, self._damages, self._lost, self._errors, self._unsent)
+
     def feedback(self, feedback: Feedback, now: float) -> None:
         """Take notice of a motor's answer."""
         motor, counter, last = feedback.motor, feedback.counter, self._counter[feedback.motor]
         lost = 0 if counter is None or last is None else (counter - last - 1) % feedback.counters
-        self.counts = replace(self.counts, received=self.counts.received + 1, lost=self.counts.lost + lost)
+        self._received += 1
+        self._lost += lost
         self._counter[motor] = counter
         self.seen[motor] = now
         self.status[motor] = feedback.status
@@ -59,23 +66,24 @@ class Health:
 
     def damaged(self, motor: int, now: float) -> None:
         """Take notice of a damaged frame of a motor."""
-        self.counts = replace(self.counts, damaged=self.counts.damaged + 1)
+        self._damages += 1
         self._damaged[motor] = now
 
     def error_frame(self, identifier: int, now: float) -> None:
         """Take notice of an error frame; identifier: its bits as Linux has them."""
-        self.counts = replace(self.counts, errors=self.counts.errors + 1)
+        self._errors += 1
         off = bool(identifier & BUS_OFF_BIT)
         self.trouble("the CAN controller is off the bus (bus-off)" if off else "error frames on the CAN bus", now)
 
     def unsent(self, reason: str, now: float) -> None:
         """Take notice of frames that the bus did not take."""
-        self.counts = replace(self.counts, unsent=self.counts.unsent + 1)
+        self._unsent += 1
         self.trouble(f"the CAN bus takes no commands ({reason})", now)
 
     def trouble(self, sentence: str, now: float) -> None:
         """Any other trouble of the bus, an alarm for a while."""
-        self._troubles[sentence] = now
+        recent = {what: when for what, when in self._troubles.items() if now - when < MEMORY}
+        self._troubles = {**recent, sentence: now}  # a new one, since other threads read it
 
     def follow(self, error: Array | None, now: float) -> None:
         """How far (N,) rad the joints are from where they were sent; None where they need not follow."""
@@ -86,7 +94,7 @@ class Health:
 
     def alarms(self, now: float, driving: bool) -> tuple[str, ...]:
         """A sentence for everything that is wrong; driving: the motors are expected to follow."""
-        sentences = [sentence for sentence, when in list(self._troubles.items()) if now - when < MEMORY]
+        sentences = [sentence for sentence, when in self._troubles.items() if now - when < MEMORY]
         for motor in range(len(self._map)):
             if (what := self._complaint(motor, now, driving)) is not None:
                 sentences.append(f"{self._map.title(motor)} {what}")

@@ -74,7 +74,7 @@ class Startup:
                 f"{self._link.strange} unknown frames): give the database of these motors"
             )
         return (
-            f"no motor answers on {where}: check the power, the wiring, the channel and the bit rate "
+            f"no motor answers on {where}: check the power, the wiring, the channel, the bit rate and the ids "
             "(or start simulated motors: naoimitate can-stub)"
         )
 

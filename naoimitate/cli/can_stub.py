@@ -44,14 +44,13 @@ def can_stub(
     model = load_robot(robot, robot_version)
     wanted = [parse_fault(text, motor_numbers(model)) for text in faults]
     bus = open_bus(interface, channel, int(model.data["can"].get("bitrate", 1_000_000)))
-    try:
+    with bus:
         stub = CanStub(model, bus, wanted, database)
         stub.start()
-        click.echo(f"ready: {len(stub.motors)} motors of {model.name} on {interface} {channel}")
-        threading.Event().wait(duration)
-        stub.stop()
-    finally:
-        bus.shutdown()
-    click.echo(
-        f"ignored: {stub.damaged} damaged and {stub.repeated} repeated commands; {stub.unsent} answers were lost"
-    )
+        try:
+            click.echo(f"ready: {len(stub.motors)} motors of {model.name} on {interface} {channel}")
+            threading.Event().wait(duration)
+        finally:
+            stub.stop()
+            ignored = f"{stub.damaged} damaged and {stub.repeated} repeated commands were ignored"
+            click.echo(f"{ignored}, {stub.unsent} answers were not sent")
