@@ -27,7 +27,7 @@ def memory(process: subprocess.Popen[str]) -> int:
 def main(arguments: list[str]) -> None:
     minutes, rate, protocol, driver = (*arguments, *("30", "240", "xsens", "mujoco")[len(arguments) :])
     seconds, out = 60.0 * float(minutes), Path("soak.npz")
-    program = [sys.executable, "-m", "naoimitate.cli"]
+    program = [str(Path(sys.executable).with_name("naoimitate"))]
     live = subprocess.Popen(
         [*program, "live", "--source", protocol, "--port", str(PORT), "--driver", driver, "--duration", str(seconds),
          "--out", str(out)],

@@ -176,10 +176,10 @@ def test_the_command_says_ready_and_ends_after_its_duration() -> None:
     assert result.output.startswith("ready: 25 motors of nao on virtual cli\n")
 
 
-def test_an_interrupted_command_leaves_without_a_traceback() -> None:
+def test_an_interrupted_command_leaves_without_a_traceback(tmp_path: Path) -> None:
     arguments = ["can-stub", "--interface", "virtual", "--channel", "cli"]
     program = [sys.executable, "-m", "naoimitate.cli", *arguments]
-    stub = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    stub = subprocess.Popen(program, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert stub.stdout is not None and stub.stdout.readline().startswith("ready")
     stub.send_signal(signal.SIGINT)
     output, errors = stub.communicate(timeout=10.0)
@@ -203,13 +203,14 @@ def test_mistakes_of_the_command_line_are_one_line(
     assert message in error and error.count("\n") == 1
 
 
-def test_driver_and_motors_find_each_other_across_processes(nao: RobotModel) -> None:
+def test_driver_and_motors_find_each_other_across_processes(nao: RobotModel, tmp_path: Path) -> None:
     try:
         can.Bus(interface="udp_multicast", channel=GROUP).shutdown()
     except (OSError, can.CanError) as error:
         pytest.skip(f"no multicast on this machine ({error})")
     stub = subprocess.Popen(
         [sys.executable, "-m", "naoimitate.cli", "can-stub", "--channel", GROUP, "--duration", "30"],
+        cwd=tmp_path,
         stdout=subprocess.PIPE,
         text=True,
     )

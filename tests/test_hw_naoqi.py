@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -302,13 +303,13 @@ def test_a_connection_that_breaks_is_told_and_the_driver_still_stops(
     assert not [thread for thread in threading.enumerate() if thread.name == "naoqi"]
 
 
-def test_a_program_that_is_killed_leaves_a_robot_at_rest(fake: RemoteNao) -> None:
+def test_a_program_that_is_killed_leaves_a_robot_at_rest(fake: RemoteNao, tmp_path: Path) -> None:
     url = fake.order("serve")
     program = (
         "import os; from naoimitate import load_robot; from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings\n"
         f"NaoqiDriver(load_robot('nao'), NaoqiSettings(url='{url}')).connect(); os.kill(os.getpid(), 9)"
     )
-    assert subprocess.run([sys.executable, "-c", program], check=False).returncode == -9
+    assert subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False).returncode == -9
     wait_for(lambda: fake.done[-2:] == [("killAll",), ("rest",)], 5.0)
 
 
