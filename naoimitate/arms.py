@@ -30,6 +30,7 @@ _PALM = (yaw_matrix(np.pi / 2), yaw_matrix(-np.pi / 2))
 """Torso from hand link in a T-pose: the links point along x, the human's arms along +-y."""
 
 
+_FREE = np.eye(3)
 AT_END, AT_BOUND = 0.02, 1e-6
 """[rad] from a joint's end, and from what a frame allows, at which it counts as there."""
 
@@ -37,7 +38,7 @@ SETTLE_STEP = 0.1
 """[rad] of each joint in one step of ``settle``."""
 
 
-ROUGHER = (0.0, 0.05, 0.2, 1.0)
+ROUGHER = (0.05, 0.2, 1.0)
 """Shares of the way from smooth bounds to those of speed alone, tried in turn where the body is in the way."""
 
 
@@ -114,13 +115,13 @@ class Arms:
         self, limb: Limb, weights: LimbWeights, task: Task, q: Array, reach: Reach, rows: tuple[Array, Array]
     ) -> tuple[int, float]:
         """One frame of a limb, as smooth as the body allows: (iterations, tip error m)."""
-        found = 0, 0.0
+        found = solve_limb(self._robot.tree, limb, weights, *task, q, reach.smooth_low, reach.smooth_high, *rows)
         for share in ROUGHER:
+            if found[0] > 0:
+                break
             low = reach.smooth_low + share * (reach.low - reach.smooth_low)
             high = reach.smooth_high + share * (reach.high - reach.smooth_high)
             found = solve_limb(self._robot.tree, limb, weights, *task, q, low, high, *rows)
-            if found[0] > 0:
-                break
         return found
 
     def _change(
@@ -165,7 +166,7 @@ class Arms:
             return np.ascontiguousarray(pose.base_rot.T), 2
         if self._orientation == "follow" and seen.hands is not None:
             return seen.hands[side] @ _PALM[side], 3
-        return np.eye(3), 0
+        return _FREE, 0
 
     def head(self, q: Array, wanted: tuple[float, float], step: float, low: Array, high: Array) -> None:
         """Turn the head of q (J,) towards yaw and pitch (rad), at most ``step`` rad, within its coupling table."""

@@ -12,6 +12,7 @@ from naoimitate.ik import bounded_step
 from naoimitate.robot.model import RobotModel
 
 Array = npt.NDArray[np.float64]
+_UNIT = np.eye(2)
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ class LandingSet:
         part = (allowed - self.yaws[row - 1]) / (self.yaws[row] - self.yaws[row - 1])
         bound = (1.0 - part) * self.reach[row - 1] + part * self.reach[row]
         x = np.empty(2)
-        bounded_step(np.eye(2), np.ascontiguousarray(p), np.ascontiguousarray(-self.directions), -bound, 0, x)
+        bounded_step(_UNIT, p, -self.directions, -bound, 0, x)
         moved = bool(np.linalg.norm(x - p) > 1e-6 or abs(allowed - turn) > 1e-6)
         return x * mirror, allowed * mirror[1], moved
 

@@ -140,10 +140,21 @@ def rotation_of(frame: HumanFrame, segment: int) -> Array | None:
     """Rotation (3, 3) world from segment; None where the frame has none, or a quaternion far from unit length."""
     if frame.orientations is None:
         return None
-    quaternion = np.ascontiguousarray(frame.orientations[segment], dtype=np.float64)
-    if not 0.1 < np.abs(quaternion).max() < 10.0:
-        return None
-    return np.asarray(matrix_from_quat(quaternion))
+    known, rotation = _rotation(np.asarray(frame.orientations[segment], dtype=np.float64))
+    return rotation if known else None
+
+
+@njit(cache=True)
+def _rotation(quaternion: Array) -> tuple[bool, Array]:
+    """Whether a quaternion (4,) is about of unit length, and its matrix (3, 3)."""
+    largest = 0.0
+    for part in quaternion:
+        largest = max(largest, abs(part))
+        if math.isnan(part):
+            return False, np.eye(3)
+    if not 0.1 < largest < 10.0:
+        return False, np.eye(3)
+    return True, matrix_from_quat(quaternion)
 
 
 @njit(cache=True)
