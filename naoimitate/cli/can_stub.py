@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import time
 from pathlib import Path
 
 import click
+
+PIECE = 0.2
+"""[s] of waiting at a time."""
 
 
 @click.command("can-stub")
@@ -34,8 +39,6 @@ def can_stub(
 
     They answer commands, move with their speed limits, and hold when no commands come for 0.1 s.
     """
-    import threading
-
     from naoimitate.hw.can.bus import open_bus
     from naoimitate.hw.can.stub import CanStub, motor_numbers
     from naoimitate.hw.can.stub_faults import parse_fault
@@ -49,7 +52,9 @@ def can_stub(
         stub.start()
         try:
             click.echo(f"ready: {len(stub.motors)} motors of {model.name} on {interface} {channel}")
-            threading.Event().wait(duration)
+            end = math.inf if duration is None else time.monotonic() + duration
+            while (left := end - time.monotonic()) > 0.0:  # in pieces: a signal just before an endless wait is lost
+                time.sleep(min(left, PIECE))
         finally:
             stub.stop()
             ignored = f"{stub.damaged} damaged and {stub.repeated} repeated commands were ignored"
