@@ -132,7 +132,7 @@ def test_a_step_too_large_for_a_period_goes_at_full_speed_and_none_at_zero(
 ) -> None:
     driver = connect()
     driver.write(command(turned(1.0)))
-    wait_for(lambda: len(fake.sent) == 1)
+    wait_for(lambda: len(fake.sent) >= 1)
     driver.write(command(turned(1.0 + 1e-6)))
     wait_for(lambda: len(fake.sent) == 2)
     assert [fraction for _, _, fraction in fake.sent] == [1.0, 0.01]
@@ -153,7 +153,7 @@ def test_zeros_and_gravity_belong_to_the_servos_alone(connect: Callable[..., Nao
     driver = connect(zeros=JointZeros("Hugo", offsets), servo_stiffness=200.0)
     q = turned(0.1)
     driver.write(command(q))
-    wait_for(lambda: len(fake.sent) == 1)
+    wait_for(lambda: len(fake.sent) >= 1)
     knee = NAO.joint("LKneePitch")
     assert fake.sent[0][1]["HeadYaw"] == pytest.approx(q[NAO.joint("HeadYaw")] + 0.01, abs=1e-4)
     assert fake.sent[0][1]["LKneePitch"] < q[knee] + 0.01 - 1e-3, "the bent knee is commanded straighter than it hangs"
