@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from naoimitate.human.tracks import minimum_jerk
+
 Array = npt.NDArray[np.float64]
 
 
@@ -33,9 +35,8 @@ class Blend:
 
     @property
     def share(self) -> float:
-        """How much of the wish counts, 0 to 1: s^3 (10 - 15 s + 6 s^2) (Flash and Hogan 1985)."""
-        s = min(self.elapsed / self.duration, 1.0) if self.duration > 0.0 else 1.0
-        return s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+        """How much of the wish counts, 0 to 1."""
+        return float(minimum_jerk(np.asarray(self.elapsed / self.duration))) if self.duration > 0.0 else 1.0
 
     def mix(self, targets: Array, offset: float) -> tuple[Array, float]:
         """Targets (4, 3) m and offset of this moment."""

@@ -16,7 +16,7 @@ import pytest
 from naoimitate.cli import run as command
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import RunFileError, StreamError
-from naoimitate.hw.guarded import GuardedDriver
+from naoimitate.hw.guarded import Condition, GuardedDriver
 from naoimitate.hw.none import NoDriver
 from naoimitate.live.loop import Beat, Loop
 from naoimitate.live.protocols.registry import PROTOCOLS
@@ -192,3 +192,23 @@ def test_mistakes_are_one_line(arguments: list[str], word: str, capsys: pytest.C
     assert command(["live", *arguments]) == 2
     error = capsys.readouterr().err
     assert word in error and error.count("\n") == 1
+
+
+def test_a_robot_that_refuses_everything_ends_in_a_fault_that_moves_nothing(
+    nao: RobotModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    receiver, loop, beats = rig(nao)
+    elsewhere = nao.postures["stand"].copy()
+    elsewhere[nao.joint("LShoulderPitch")] -= 1.0
+    state = loop.driver.read()
+    loop.driver.stop()
+    driver = NoDriver(nao)
+    monkeypatch.setattr(driver, "read", lambda: replace(state, q=elsewhere))
+    loop.driver = GuardedDriver(driver, CommandGate(nao))
+    loop.driver.connect()
+    loop.run(duration=1.6)
+    receiver.close()
+    assert beats[-1].tick.state.value == "fault"
+    assert "refused" in loop.session.reason
+    assert loop.driver.status.condition is Condition.EMERGENCY
+    assert loop.driver.status.accepted == 0

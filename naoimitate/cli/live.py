@@ -144,20 +144,8 @@ def _listen(session: Session, driver: GuardedDriver, robot: RobotModel, options:
 
 def _run(loop: Loop, duration: float) -> None:
     """The loop, with keys and a panel where there is a terminal."""
-    from naoimitate.live.keys import listening, pressed
+    from naoimitate.live.keys import listening, obey, pressed
     from naoimitate.live.panel import Panel
-
-    def ended() -> bool:
-        key = pressed()
-        if key == " ":
-            loop.driver.emergency_stop()
-        elif key == "c":
-            loop.session.clutch()
-        elif key == "r":
-            loop.driver.reset()
-            loop.driver.connect()
-            loop.session.reset()
-        return key == "q"
 
     with listening() as keys:
         if not keys:
@@ -165,7 +153,7 @@ def _run(loop: Loop, duration: float) -> None:
             return
         with Panel(loop.session, loop.stream, loop.driver) as panel:
             loop.watch.append(panel.take)
-            loop.run(duration, ended)
+            loop.run(duration, lambda: obey(pressed(), loop.session, loop.driver))
 
 
 def _replay(path: Path, session: Session, driver: GuardedDriver, robot: RobotModel, options: dict[str, Any]) -> None:

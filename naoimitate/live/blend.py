@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from naoimitate.core.frames import LANDMARK, SIDES, Array, HumanFrame, Motion
+from naoimitate.human.tracks import minimum_jerk
 
 _BONES = tuple(
     (LANDMARK[a], LANDMARK[b])
@@ -33,12 +34,6 @@ STRAIGHT = 0.05
 """m off the line from hip to ankle: a knee nearer to it does not tell to which side it bends."""
 
 
-def minimum_jerk(share: float) -> float:
-    """Way from 0 to 1 at a share of its time: at rest at both ends (Flash and Hogan 1985, eq. 3)."""
-    s = min(max(share, 0.0), 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-
-
 class Blend:
     """The way from frame ``a`` to frame ``b`` in ``duration`` s, with minimum jerk.
 
@@ -53,7 +48,7 @@ class Blend:
 
     def at(self, time: float) -> HumanFrame:
         """The person at a time from 0 to ``duration``, s."""
-        share = minimum_jerk(time / self._duration)
+        share = float(minimum_jerk(np.asarray(time / self._duration)))
         frame = self._straight.at(share)
         a, b, p = self._a.landmarks, self._b.landmarks, frame.landmarks.copy()
         for start, end in _BONES:

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import select
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+from naoimitate.core.errors import DriverError
+from naoimitate.fsm.session import State
+from naoimitate.hw.guarded import GuardedDriver
+from naoimitate.live.session import Session
 
 HELP = "space: emergency stop   c: pause or go on   r: reset after a fault   q: end"
 
@@ -31,5 +37,35 @@ def listening() -> Iterator[bool]:
 
 
 def pressed() -> str:
-    """The next key that was pressed, or nothing."""
-    return sys.stdin.read(1) if select.select([sys.stdin], [], [], 0.0)[0] else ""
+    """All keys pressed since the last call; none waits in a buffer of ours, an emergency stop least of all."""
+    ready = select.select([sys.stdin], [], [], 0.0)[0]
+    return os.read(sys.stdin.fileno(), 64).decode(errors="ignore") if ready else ""
+
+
+def obey(keys: str, session: Session, driver: GuardedDriver) -> bool:
+    """Do what the operator wants, the emergency stop first; returns whether the session is to end.
+
+    Only a session in fault is reset: a robot that follows is not connected anew.
+    """
+    if " " in keys:
+        driver.emergency_stop()
+        return False
+    for key in keys:
+        if key == "c":
+            session.clutch()
+        elif key == "r" and session.state is State.FAULT:
+            _reset(session, driver)
+        elif key == "q":
+            return True
+    return False
+
+
+def _reset(session: Session, driver: GuardedDriver) -> None:
+    """Connect again; a robot that cannot be is still in fault, for the reason that the panel shows."""
+    try:
+        driver.reset()
+        driver.connect()
+    except DriverError as error:
+        session.reason = str(error)
+    else:
+        session.reset()

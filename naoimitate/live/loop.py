@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from naoimitate.core.errors import StreamError
+from naoimitate.fsm.session import State
 from naoimitate.hw.guarded import Condition, GuardedDriver, GuardStatus
 from naoimitate.live.receiver import Datagram, Receiver
 from naoimitate.live.session import Session, Tick
@@ -64,23 +65,26 @@ class Loop:
             started = time.perf_counter()
             tick = self.session.step(now)
             spent = time.perf_counter() - started
-            self.driver.write(tick.command)
-            self._look_after(self.driver.status)
+            if tick.state is not State.FAULT:
+                self.driver.write(tick.command)
+                self._look_after(self.driver.status)
             latency = time.monotonic() - newest[0] if newest is not None and tick.fresh else math.nan
             last = now
             beat = Beat(tick, now, latency, spent)
             for watcher in self.watch:
                 watcher(beat)
+        self.session.stop()
         complaint = self.stream.complaint()
         if complaint:
             raise StreamError(complaint)
 
     def _look_after(self, status: GuardStatus) -> None:
-        """Tell the session of a robot that does not follow any more."""
+        """Tell the session of a robot that does not follow any more, and let go of it; a fault moves nothing."""
         if status.condition is not Condition.LIVE:
             self.session.fault(status.problem or status.condition.value)
         elif status.held > REFUSED:
             self.session.fault(f"commands are refused: {', '.join(status.refusing)}")
+            self.driver.emergency_stop()
 
     def _receive(self, last: float) -> None:
         """Wait for a frame, or for the driver's period; what came is taken."""
