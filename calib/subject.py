@@ -57,22 +57,37 @@ def save_subject(subject: Subject, path: str | Path) -> None:
 
 def load_subject(path: str | Path) -> Subject:
     """Read a subject file; CalibrationError where it is missing, damaged or of another format."""
+    return parse_subject(read_subject(path), str(path))
+
+
+def read_subject(path: str | Path) -> str:
+    """The text of a subject file; CalibrationError where it is none."""
     try:
-        document = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        if document["format"] != FORMAT:
-            raise CalibrationError(f"{path}: format {document['format']!r} is not {FORMAT}")
-        tpose = document["tpose"]
-        landmarks = np.array([tpose["landmarks_m"][name] for name in LANDMARKS], dtype=np.float64)
-        given = tpose["orientations_wxyz"]
-        orientations = None if given is None else np.array([given[name] for name in SEGMENTS], dtype=np.float64)
-        if landmarks.shape != (len(LANDMARKS), 3) or (
-            orientations is not None and orientations.shape != (len(SEGMENTS), 4)
-        ):
-            raise CalibrationError(f"{path}: a landmark or orientation has the wrong number of values; calibrate again")
+        text = Path(path).read_text(encoding="utf-8")
     except FileNotFoundError:
         raise CalibrationError(f"{path}: no such subject file; make one with `naoimitate calibrate`") from None
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError, ValueError):
+    except (OSError, UnicodeDecodeError):
         raise CalibrationError(f"{path}: not a subject file; make one with `naoimitate calibrate`") from None
+    parse_subject(text, str(path))
+    return text
+
+
+def parse_subject(text: str, name: str) -> Subject:
+    """The subject of a subject file's text; name: of the file, for CalibrationError."""
+    try:
+        document = yaml.safe_load(text)
+        if document["format"] != FORMAT:
+            raise CalibrationError(f"{name}: format {document['format']!r} is not {FORMAT}")
+        tpose = document["tpose"]
+        landmarks = np.array([tpose["landmarks_m"][mark] for mark in LANDMARKS], dtype=np.float64)
+        given = tpose["orientations_wxyz"]
+        orientations = None if given is None else np.array([given[part] for part in SEGMENTS], dtype=np.float64)
+    except (yaml.YAMLError, KeyError, TypeError, ValueError):
+        raise CalibrationError(f"{name}: not a subject file; make one with `naoimitate calibrate`") from None
+    if landmarks.shape != (len(LANDMARKS), 3) or (
+        orientations is not None and orientations.shape != (len(SEGMENTS), 4)
+    ):
+        raise CalibrationError(f"{name}: a landmark or orientation has the wrong number of values; calibrate again")
     return calibrate(HumanFrame(0.0, landmarks, orientations))
 
 

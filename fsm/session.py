@@ -38,6 +38,8 @@ class Event(enum.Enum):
     """The robot has come from where it was to the operator's posture."""
     CLUTCH = "clutch"
     """The operator pauses, or goes on."""
+    BODY = "upper body"
+    """The operator wants the upper body alone to be imitated, or the whole body again."""
     LATE = "late"
     """No frame for longer than prediction may bridge."""
     LOST = "lost"
@@ -89,12 +91,15 @@ EDGES: tuple[Edge, ...] = (
     Edge(_S.BLENDING, _E.BLENDED, None, _A.NONE, _S.TRACKING),
     Edge(_S.BLENDING, _E.LATE, None, _A.HOLD, _S.HOLDING),
     Edge(_S.BLENDING, _E.CLUTCH, None, _A.HOLD, _S.CLUTCHED),
+    Edge(_S.BLENDING, _E.BODY, None, _A.BLEND, _S.BLENDING),
     Edge(_S.TRACKING, _E.LATE, None, _A.HOLD, _S.HOLDING),
     Edge(_S.TRACKING, _E.CLUTCH, None, _A.HOLD, _S.CLUTCHED),
+    Edge(_S.TRACKING, _E.BODY, None, _A.BLEND, _S.BLENDING),
     Edge(_S.HOLDING, _E.FRAME, None, _A.BLEND, _S.BLENDING),
     Edge(_S.HOLDING, _E.CLUTCH, None, _A.NONE, _S.CLUTCHED),
     Edge(_S.HOLDING, _E.LOST, None, _A.STAND, _S.RETURNING),
     Edge(_S.CLUTCHED, _E.CLUTCH, None, _A.BLEND, _S.BLENDING),
+    Edge(_S.CLUTCHED, _E.BODY, None, _A.NONE, _S.CLUTCHED),
     Edge(_S.CLUTCHED, _E.TPOSE, None, _A.CALIBRATE, _S.BLENDING),
     Edge(_S.CLUTCHED, _E.LOST, None, _A.STAND, _S.RETURNING),
     Edge(_S.RETURNING, _E.FRAME, None, _A.BLEND, _S.BLENDING),

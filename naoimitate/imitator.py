@@ -49,6 +49,8 @@ class Imitator:
     def __init__(self, robot: RobotModel, settings: Settings | None = None) -> None:
         self.robot, self.settings = robot, settings or Settings()
         s = self.settings
+        self.upper_body = s.upper_body
+        """Whether the robot stands and imitates arms and head only; may be changed between steps."""
         legs = self._legs = build_legs(robot, s.legs)
         self._clearance = Clearance(robot, s.clearance)
         self._maker = PoseMaker(robot, legs)
@@ -134,7 +136,7 @@ class Imitator:
         seen = self._observer.see(frame, support)
         targets = self._within_reach(self.mapping.targets(seen.body.posture))
         footing = self._footing(seen, targets, ahead, may_lift)
-        if self.settings.upper_body:
+        if self.upper_body:
             targets[FEET] = self._standing
             footing = replace(footing, support="D", offset=0.5, ahead="")
         if self._blend is not None:

@@ -6,7 +6,7 @@ import pytest
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError
-from naoimitate.fsm.session import State
+from naoimitate.fsm.session import Event, State
 from naoimitate.hw.guarded import Condition, GuardedDriver
 from naoimitate.hw.none import NoDriver
 from naoimitate.live.keys import obey
@@ -44,7 +44,7 @@ def test_a_robot_that_follows_is_not_connected_anew(
 
 def test_a_fault_is_reset(session: Session, driver: GuardedDriver) -> None:
     driver.emergency_stop()
-    session.fault("emergency stop")
+    session.tell(Event.FAULT, "emergency stop")
     assert not obey("r", session, driver)
     assert session.state is State.WAITING and driver.status.condition is Condition.LIVE
 
@@ -55,7 +55,7 @@ def test_a_robot_that_cannot_be_connected_stays_in_fault_and_says_why(
     def unreachable() -> None:
         raise DriverError("nobody there")
 
-    session.fault("it fell")
+    session.tell(Event.FAULT, "it fell")
     monkeypatch.setattr(driver, "connect", unreachable)
     assert not obey("r", session, driver)
     assert session.state is State.FAULT and session.reason == "nobody there"

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,9 +17,10 @@ import pytest
 from naoimitate.cli import run as command
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import RunFileError, StreamError
+from naoimitate.hw.driver import Driver
 from naoimitate.hw.guarded import Condition, GuardedDriver
 from naoimitate.hw.none import NoDriver
-from naoimitate.live.loop import Beat, Loop
+from naoimitate.live.loop import Beat, Loop, Turn, listen
 from naoimitate.live.protocols.registry import PROTOCOLS
 from naoimitate.live.receiver import Receiver
 from naoimitate.live.recording import Recorder, play, read_recording
@@ -54,22 +56,36 @@ class Sender:
             time.sleep(0.01)
 
 
-def rig(nao: RobotModel) -> tuple[Receiver, Loop, list[Beat]]:
-    session, receiver = Session(nao, live=QUICK), Receiver("127.0.0.1", 0)
-    session.warm_up()
-    beats: list[Beat] = []
-    stream = Stream(JSON, tuple(PROTOCOLS.values()))
-    driver = GuardedDriver(NoDriver(nao), CommandGate(nao))
-    driver.connect()
-    return receiver, Loop(session, stream, receiver, driver, [beats.append]), beats
+@dataclass
+class Rig:
+    """A session that listens on a port of its own, with a driver that moves nothing."""
+
+    nao: RobotModel
+
+    def __post_init__(self) -> None:
+        self.session, self.receiver = Session(self.nao, live=QUICK), Receiver("127.0.0.1", 0)
+        self.session.warm_up()
+        self.beats: list[Beat] = []
+        self.stream = Stream(JSON, tuple(PROTOCOLS.values()))
+        self.connect(NoDriver(self.nao))
+
+    def connect(self, driver: Driver) -> None:
+        self.driver = GuardedDriver(driver, CommandGate(self.nao))
+        self.driver.connect()
+
+    def run(self, duration: float, ended: Callable[[], bool] = lambda: False, recorder: Recorder | None = None) -> None:
+        loop = Loop(self.session, self.driver, [self.beats.append])
+        if recorder is not None:
+            loop.watch.append(recorder.beat)
+        record = recorder.datagram if recorder is not None else lambda datagram: None
+        loop.run(listen(self.session, self.stream, self.receiver, self.driver.period, record), duration, ended)
+        self.receiver.close()
 
 
 def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(nao: RobotModel, tmp_path: Path) -> None:
-    receiver, loop, beats = rig(nao)
+    rig = Rig(nao)
     recorder = Recorder(tmp_path / "stream.rec", {"protocol": "json"})
-    loop.record = recorder.datagram
-    loop.watch.append(lambda beat: recorder.step(beat.now))
-    sender, done = Sender(receiver.port), threading.Event()
+    sender, done = Sender(rig.receiver.port), threading.Event()
 
     def story() -> None:
         time.sleep(0.3)
@@ -80,10 +96,10 @@ def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(n
 
     thread = threading.Thread(target=story)
     thread.start()
-    loop.run(duration=30.0, ended=done.is_set)
+    rig.run(30.0, done.is_set, recorder)
     thread.join()
     recorder.close()
-    receiver.close()
+    beats = rig.beats
     states = [beat.tick.state.value for beat in beats]
     order = [s for k, s in enumerate(states) if k == 0 or states[k - 1] != s]
     assert order[0] == "waiting" and order[-1] in ("blending", "tracking")
@@ -94,20 +110,19 @@ def test_packets_alone_drive_the_session_and_a_recording_gives_the_same_joints(n
     again.warm_up()
     repeated = list(play(read_recording(tmp_path / "stream.rec"), again, Stream(JSON, ())))
     assert len(repeated) == len(beats)
-    for (_, tick), beat in zip(repeated, beats, strict=True):
-        assert np.array_equal(tick.command.q, beat.tick.command.q)
-        assert tick.state is beat.tick.state
+    for turn, beat in zip(repeated, beats, strict=True):
+        assert np.array_equal(turn.tick.command.q, beat.tick.command.q)
+        assert turn.tick.state is beat.tick.state
 
 
 def test_another_protocol_than_asked_for_is_named(nao: RobotModel) -> None:
-    receiver, loop, _ = rig(nao)
+    rig = Rig(nao)
     encoder, out = PROTOCOLS["xsens"].encoder(), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     for k in range(5):
         for datagram in encoder.encode(tpose(), k, 0.01 * k):
-            out.sendto(datagram, ("127.0.0.1", receiver.port))
-    with pytest.raises(StreamError, match="this looks like"):
-        loop.run(duration=0.2)
-    receiver.close()
+            out.sendto(datagram, ("127.0.0.1", rig.receiver.port))
+    rig.run(0.2)
+    assert "this looks like" in rig.stream.complaint()
 
 
 def test_a_port_in_use_is_one_clear_error() -> None:
@@ -159,11 +174,13 @@ def test_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> None:
         finish(out)
 
 
-def test_a_torn_recording_plays_to_its_tear_and_other_files_are_refused(tmp_path: Path) -> None:
+def test_a_torn_recording_plays_to_its_tear_and_other_files_are_refused(nao: RobotModel, tmp_path: Path) -> None:
     path = tmp_path / "a.rec"
     recorder = Recorder(path, {"protocol": "json"})
+    session = Session(nao)
+    session.start()
     for k in range(100):
-        recorder.step(0.01 * k)
+        recorder.beat(Beat(Turn(session.step(0.01 * k), 0.01 * k)))
     recorder.close()
     path.write_bytes(path.read_bytes()[:-4])
     assert len(read_recording(path).events) == 99
@@ -184,7 +201,7 @@ def test_the_command_says_when_it_is_ready_and_ends_in_peace(tmp_path: Path) -> 
     "arguments, word",
     [
         (["--source", "nonsense", "--driver", "none"], "there are xsens"),
-        (["--source", "replay:missing.rec", "--driver", "none"], "cannot read"),
+        (["--source", "replay:missing.rec", "--driver", "none"], "cannot be read"),
         (["--source", "json", "--driver", "none", "--bind", "192.0.2.7"], "--bind"),
     ],
 )
@@ -197,18 +214,16 @@ def test_mistakes_are_one_line(arguments: list[str], word: str, capsys: pytest.C
 def test_a_robot_that_refuses_everything_ends_in_a_fault_that_moves_nothing(
     nao: RobotModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    receiver, loop, beats = rig(nao)
+    rig = Rig(nao)
     elsewhere = nao.postures["stand"].copy()
     elsewhere[nao.joint("LShoulderPitch")] -= 1.0
-    state = loop.driver.read()
-    loop.driver.stop()
+    state = rig.driver.read()
+    rig.driver.stop()
     driver = NoDriver(nao)
     monkeypatch.setattr(driver, "read", lambda: replace(state, q=elsewhere))
-    loop.driver = GuardedDriver(driver, CommandGate(nao))
-    loop.driver.connect()
-    loop.run(duration=1.6)
-    receiver.close()
-    assert beats[-1].tick.state.value == "fault"
-    assert "refused" in loop.session.reason
-    assert loop.driver.status.condition is Condition.EMERGENCY
-    assert loop.driver.status.accepted == 0
+    rig.connect(driver)
+    rig.run(1.6)
+    assert rig.beats[-1].tick.state.value == "fault"
+    assert "refused" in rig.session.reason
+    assert rig.driver.status.condition is Condition.EMERGENCY
+    assert rig.driver.status.accepted == 0

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from naoimitate.core.frames import LANDMARK, HumanFrame, RobotCommand
-from naoimitate.fsm.session import State
+from naoimitate.fsm.session import Event, State
+from naoimitate.live.performance import moved
 from naoimitate.live.session import Session, SessionSettings, Tick
 from naoimitate.motion.builtin import builtin_motion, tpose
 from naoimitate.robot.model import RobotModel
@@ -102,7 +103,7 @@ def test_a_silent_stream_holds_then_returns_and_a_stream_that_comes_back_blends_
 def test_a_paused_operator_may_do_anything_and_is_blended_in_again(nao: RobotModel) -> None:
     def act(session: Session, time: float) -> None:
         if time in (6.0, 9.0):
-            session.clutch()
+            session.tell(Event.CLUTCH)
 
     story = play(nao, 12.0, act=act)
     assert story.states() == ["calibrating", "blending", "tracking", "clutched", "blending", "tracking"]
@@ -111,11 +112,42 @@ def test_a_paused_operator_may_do_anything_and_is_blended_in_again(nao: RobotMod
     assert_smooth(nao, story)
 
 
+def test_a_paused_operator_may_walk_off_and_turn_and_the_robot_goes_on_from_where_it_is(nao: RobotModel) -> None:
+    def person(time: float) -> HumanFrame | None:
+        frame = operator(time)
+        assert frame is not None
+        share = float(np.clip((time - 6.5) / 2.0, 0.0, 1.0))
+        return moved(frame, 2.0 * share, np.array([share, -2.0 * share, 0.0]))
+
+    def act(session: Session, time: float) -> None:
+        if time in (6.0, 9.0):
+            session.tell(Event.CLUTCH)
+
+    plain, turned = play(nao, 14.0, act=act), play(nao, 14.0, person, act=act)
+    assert turned.states() == plain.states()
+    last = [story.commands()[-1] for story in (plain, turned)]
+    assert np.abs(last[0].q - last[1].q).max() < 0.02
+    assert_smooth(nao, turned)
+
+
+def test_the_legs_may_be_left_out_and_taken_in_again(nao: RobotModel) -> None:
+    def act(session: Session, time: float) -> None:
+        if time in (6.0, 13.0):
+            session.tell(Event.BODY)
+
+    story = play(nao, 20.0, act=act)
+    assert story.states() == ["calibrating", "blending", "tracking", "blending", "tracking", "blending", "tracking"]
+    supports = [{t.command.support for t, at in zip(story.ticks, story.times, strict=True) if a < at < b}
+                for a, b in ((9.5, 13.0), (14.5, 20.0))]  # fmt: skip
+    assert supports[0] == {"D"} and len(supports[1]) > 1
+    assert_smooth(nao, story)
+
+
 def test_a_t_pose_of_a_paused_operator_begins_another_run(nao: RobotModel) -> None:
     def person(time: float) -> HumanFrame | None:
         return replace(tpose(), time=time, support=None) if time > 7.0 else operator(time)
 
-    story = play(nao, 12.0, person, act=lambda s, t: s.clutch() if t == 6.5 else None)
+    story = play(nao, 12.0, person, act=lambda s, t: s.tell(Event.CLUTCH) if t == 6.5 else None)
     assert sum(tick.began for tick in story.ticks) == 2
     assert story.states()[-3:] == ["clutched", "blending", "tracking"]
 
@@ -123,9 +155,9 @@ def test_a_t_pose_of_a_paused_operator_begins_another_run(nao: RobotModel) -> No
 def test_a_fault_ends_the_session_until_the_robot_stands_again(nao: RobotModel) -> None:
     def act(session: Session, time: float) -> None:
         if time == 6.0:
-            session.fault("it fell")
+            session.tell(Event.FAULT, "it fell")
         if time == 8.0:
-            session.reset()
+            session.tell(Event.RESET)
 
     story = play(nao, 9.0, act=act)
     assert story.states() == ["calibrating", "blending", "tracking", "fault", "blending"]

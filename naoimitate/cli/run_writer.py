@@ -26,12 +26,14 @@ class Writer:
         """One turn of the loop."""
         if self._out is None:
             return
-        self._begin = beat.now if self._begin is None else self._begin
+        self._begin = beat.turn.now if self._begin is None else self._begin
         if beat.tick.began or (self._journal is None and beat.tick.fresh):
             self._next()
         if self._journal is not None:
             tick = beat.tick
-            self._journal.add(tick.command, tick.arrival - self._begin, tick.state.value, beat.latency, beat.step_time)
+            self._journal.add(
+                tick.command, tick.arrival - self._begin, tick.state.value, beat.latency, beat.turn.step_time
+            )
 
     def close(self) -> list[str]:
         """Finish the last run file; a line for each."""

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
 SHARE = types.Number("P", least=0.0, most=1.0)
 DELAY = types.Number("MS", least=0.0, most=10000.0)
 HOLD = types.Number("S", least=0.0, most=3600.0)
-DEFAULT_RATE = 60.0
-"""Hz, where the motion is a single frame."""
 
 
 @click.command()
@@ -45,7 +43,7 @@ def stream(motion: str, **options: Any) -> None:
     """
     from naoimitate.live.performance import Performance
     from naoimitate.live.protocols.registry import PROTOCOLS
-    from naoimitate.live.sender import Conditions, Tally, UdpSender, address, frames, play, through
+    from naoimitate.live.sender import DEFAULT_RATE, Conditions, Tally, UdpSender, address, frames, play, through
 
     protocol = PROTOCOLS[options["protocol"]]
     to = address(options["to"], protocol.port)

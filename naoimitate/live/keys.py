@@ -9,11 +9,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from naoimitate.core.errors import DriverError
-from naoimitate.fsm.session import State
+from naoimitate.fsm.session import Event, State
 from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.live.session import Session
 
-HELP = "space: emergency stop   c: pause or go on   r: reset after a fault   q: end"
+HELP = "space: emergency stop   c: pause or go on   u: upper body only or all   r: reset after a fault   q: end"
 
 
 @contextmanager
@@ -52,7 +52,9 @@ def obey(keys: str, session: Session, driver: GuardedDriver) -> bool:
         return False
     for key in keys:
         if key == "c":
-            session.clutch()
+            session.tell(Event.CLUTCH)
+        elif key == "u":
+            session.tell(Event.BODY)
         elif key == "r" and session.state is State.FAULT:
             _reset(session, driver)
         elif key == "q":
@@ -68,4 +70,4 @@ def _reset(session: Session, driver: GuardedDriver) -> None:
     except DriverError as error:
         session.reason = str(error)
     else:
-        session.reset()
+        session.tell(Event.RESET)

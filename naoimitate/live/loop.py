@@ -1,16 +1,15 @@
-"""The live loop: datagrams in, commands out, one thread; the only place with a clock."""
+"""The live loop: every turn of a session goes to the driver, and the driver's troubles to the session."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from naoimitate.core.errors import StreamError
-from naoimitate.fsm.session import State
+from naoimitate.fsm.session import Event, State
 from naoimitate.hw.guarded import Condition, GuardedDriver, GuardStatus
-from naoimitate.live.receiver import Datagram, Receiver
+from naoimitate.live.receiver import Datagram, Source
 from naoimitate.live.session import Session, Tick
 from naoimitate.live.stream import Stream
 
@@ -21,81 +20,125 @@ REFUSED = 1.0
 
 
 @dataclass(frozen=True)
-class Beat:
-    """One turn of the loop, for those who watch or write: the tick, when, and how long it took.
+class Turn:
+    """A step of a session, not yet with the driver.
 
-    now: s, monotonic. latency: s from the arrival of the datagram that caused the step to the driver, NaN without one.
-    step_time: s of wall time in the session.
+    now: s, on the clock of the session. arrival: s, of the datagram that caused the step, NaN without one.
+    receive: s from arrival to use. observe: s to filter and watch the frame. imitate: s to find the command.
     """
 
     tick: Tick
     now: float
-    latency: float
-    step_time: float
+    arrival: float = math.nan
+    receive: float = math.nan
+    observe: float = 0.0
+    imitate: float = 0.0
+
+    @property
+    def step_time(self) -> float:
+        """s of the whole computation of the step."""
+        return self.observe + self.imitate
+
+
+@dataclass(frozen=True)
+class Beat:
+    """A turn that the driver has got, for those who watch or write.
+
+    latency: s from the arrival of the datagram that caused the step to the driver, NaN without one. gate, hand_over: s
+    that the safety gate took, and the driver to take the command.
+    """
+
+    turn: Turn
+    latency: float = math.nan
+    gate: float = 0.0
+    hand_over: float = 0.0
+
+    @property
+    def tick(self) -> Tick:
+        """The step of the session."""
+        return self.turn.tick
 
 
 @dataclass
 class Loop:
-    """A session between a stream and a driver.
-
-    watch: called with every beat. record: called with every datagram, before it is decoded. ended: asked in every turn.
-    """
+    """A session and its driver. watch: called with every beat."""
 
     session: Session
-    stream: Stream
-    receiver: Receiver
     driver: GuardedDriver
     watch: list[Callable[[Beat], None]] = field(default_factory=list)
-    record: Callable[[Datagram], None] | None = None
 
-    def run(self, duration: float = math.inf, ended: Callable[[], bool] = lambda: False) -> None:
-        """Run for ``duration`` s, or until ``ended``; the driver is connected, and is left connected.
+    def run(self, turns: Iterator[Turn], duration: float = math.inf, ended: Callable[[], bool] = lambda: False) -> None:
+        """Run for ``duration`` s, until ``ended``, or until there are no more turns.
 
-        Raises StreamError at the end when nothing that came was understood.
+        The driver is connected before, and left connected.
         """
-        begin = last = time.monotonic()
-        self.session.start()
-        while not ended() and last - begin < duration:
-            self._receive(last)
-            newest = self.stream.newest()
-            if newest is not None:
-                arrival, sample = newest
-                self.session.see(sample.frame, arrival)
-            now = time.monotonic()
+        begin = math.nan
+        for turn in turns:
+            begin = turn.now if math.isnan(begin) else begin
+            self._beat(turn)
+            if turn.now - begin >= duration or ended():
+                break
+        self.session.tell(Event.STOP)
+
+    def _beat(self, turn: Turn) -> None:
+        """Hand a turn's command over; a fault moves nothing."""
+        gate = hand_over = 0.0
+        if turn.tick.state is not State.FAULT:
             started = time.perf_counter()
-            tick = self.session.step(now)
-            spent = time.perf_counter() - started
-            if tick.state is not State.FAULT:
-                self.driver.write(tick.command)
-                self._look_after(self.driver.status)
-            latency = time.monotonic() - newest[0] if newest is not None and tick.fresh else math.nan
-            last = now
-            beat = Beat(tick, now, latency, spent)
-            for watcher in self.watch:
-                watcher(beat)
-        self.session.stop()
-        complaint = self.stream.complaint()
-        if complaint:
-            raise StreamError(complaint)
+            self.driver.write(turn.tick.command)
+            gate = time.perf_counter() - started
+            self._look_after(self.driver.status)
+        latency = time.monotonic() - turn.arrival if turn.tick.fresh else math.nan
+        beat = Beat(turn, latency, gate, hand_over)
+        for watcher in self.watch:
+            watcher(beat)
 
     def _look_after(self, status: GuardStatus) -> None:
-        """Tell the session of a robot that does not follow any more, and let go of it; a fault moves nothing."""
+        """Tell the session of a robot that does not follow any more, and let go of it."""
         if status.condition is not Condition.LIVE:
-            self.session.fault(status.problem or status.condition.value)
+            self.session.tell(Event.FAULT, status.problem or status.condition.value)
         elif status.held > REFUSED:
-            self.session.fault(f"commands are refused: {', '.join(status.refusing)}")
+            self.session.tell(Event.FAULT, f"commands are refused: {', '.join(status.refusing)}")
             self.driver.emergency_stop()
 
-    def _receive(self, last: float) -> None:
-        """Wait for a frame, or for the driver's period; what came is taken."""
-        due, soonest, before = last + self.driver.period, last + SHORTEST, self.stream.counts.frames
-        while True:
-            now = time.monotonic()
-            fresh = self.stream.counts.frames != before
-            if now >= due or (fresh and now >= soonest):
-                return
-            self.receiver.wait((soonest if fresh else due) - now)
-            for datagram in self.receiver.read():
-                if self.record is not None:
-                    self.record(datagram)
-                self.stream.take(datagram.arrival, datagram.address, datagram.payload)
+
+def listen(
+    session: Session,
+    stream: Stream,
+    source: Source,
+    period: float,
+    record: Callable[[Datagram], None] = lambda datagram: None,
+) -> Iterator[Turn]:
+    """Turns as datagrams come: one for each fresh frame, or after ``period`` s without one; ends with the source.
+
+    record: called with every datagram before it is decoded.
+    """
+    last = time.monotonic()
+    session.start()
+    while not source.ended:
+        _receive(stream, source, last, period, record)
+        newest = stream.newest()
+        arrival = math.nan
+        if newest is not None:
+            arrival, sample = newest
+            session.see(sample.frame, arrival)
+        last = time.monotonic()
+        started = time.perf_counter()
+        session.observe(last)
+        observed = time.perf_counter()
+        tick = session.imitate()
+        yield Turn(tick, last, arrival, last - arrival, observed - started, time.perf_counter() - observed)
+
+
+def _receive(stream: Stream, source: Source, last: float, period: float, record: Callable[[Datagram], None]) -> None:
+    """Wait for a frame, or for the period after the ``last`` step (s); what came is taken."""
+    due, soonest, before = last + period, last + SHORTEST, stream.counts.frames
+    while True:
+        now = time.monotonic()
+        fresh = stream.counts.frames != before
+        if now >= due or (fresh and now >= soonest):
+            return
+        source.wait((soonest if fresh else due) - now)
+        for datagram in source.read():
+            record(datagram)
+            stream.take(datagram.arrival, datagram.address, datagram.payload)

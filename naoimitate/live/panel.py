@@ -1,4 +1,4 @@
-"""What the operator sees: state, countdown, support, delays and losses, a few times a second."""
+"""What the operator sees: state, countdown, support, margin, delays and losses, a few times a second."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.table import Table
 
+from naoimitate.command_gate import CommandGate
+from naoimitate.core.frames import RobotCommand
 from naoimitate.fsm.session import State
 from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.live.keys import HELP
@@ -23,15 +25,17 @@ RECENT = 1000
 """Steps that the delays are taken from."""
 PERIOD = 0.25
 """[s] between two pictures: drawing takes time from the robot."""
+STAGES = ("receive", "filter", "imitate", "gate", "hand over", "datagram to driver")
+"""Of a frame on its way; the last is the whole."""
+SIDES = {"L": "left", "R": "right"}
 
 
 class Panel:
     """A table in the terminal that another thread keeps up to date; the bell rings when the robot begins to follow."""
 
-    def __init__(self, session: Session, stream: Stream, driver: GuardedDriver) -> None:
-        self._session, self._stream, self._driver = session, stream, driver
-        self._latency: deque[float] = deque(maxlen=RECENT)
-        self._steps: deque[float] = deque(maxlen=RECENT)
+    def __init__(self, session: Session, stream: Stream, driver: GuardedDriver, gate: CommandGate) -> None:
+        self._session, self._stream, self._driver, self._gate = session, stream, driver, gate
+        self._stages: dict[str, deque[float]] = {stage: deque(maxlen=RECENT) for stage in STAGES}
         self._last: Beat | None = None
         self._console = Console(stderr=True)
         self._live = Live(self.table(), console=self._console, auto_refresh=False)
@@ -52,9 +56,11 @@ class Panel:
 
     def take(self, beat: Beat) -> None:
         """One turn of the loop."""
-        if not math.isnan(beat.latency):
-            self._latency.append(beat.latency)
-        self._steps.append(beat.step_time)
+        turn = beat.turn
+        if not math.isnan(turn.arrival):
+            stages = (turn.receive, turn.observe, turn.imitate, beat.gate, beat.hand_over)
+            for stage, seconds in zip(STAGES, (*stages, sum(stages)), strict=True):
+                self._stages[stage].append(seconds)
         before, self._last = self._last, beat
         if before is not None and before.tick.state is State.BLENDING and beat.tick.state is State.TRACKING:
             self._console.bell()
@@ -77,12 +83,16 @@ class Panel:
         if beat is not None:
             c = beat.tick.command
             rows.append(("support", f"person {c.human_support}, robot {c.support}, offset {c.offset:.2f}"))
+            rows.append(("the robot", why_it_waits(c) or "stands like the person"))
+            margin = self._gate.feet(c.q, c.base_pos, c.base_quat, c.support).margin
+            rows.append(("balance", f"{1e3 * margin:.0f} mm inside the feet"))
             rows.append(("given up", c.given_up.name or "nothing"))
         rate, jitter = self._stream.rate, 1e3 * self._stream.jitter
         rows.append(("stream", f"{rate:.0f} Hz, jitter {jitter:.1f} ms, {counts.lost} lost, {counts.late} late"))
         rows.append(("other packets", f"{counts.damaged} damaged, {counts.foreign} of other senders"))
-        rows.append(("datagram to driver", _delays(self._latency)))
-        rows.append(("imitation", _delays(self._steps)))
+        complaint = self._stream.complaint()
+        rows.extend([("trouble", complaint)] if complaint else [])
+        rows.extend((stage, _delays(seconds)) for stage, seconds in self._stages.items())
         rows.append(("robot", f"{status.condition.value}, {sum(status.refused.values())} commands refused"))
         rows.extend(("alarm", alarm) for alarm in status.alarms)
         return rows
@@ -90,6 +100,16 @@ class Panel:
     def _draw(self) -> None:
         while not self._halt.wait(PERIOD):
             self._live.update(self.table(), refresh=True)
+
+
+def why_it_waits(command: RobotCommand) -> str:
+    """Why the robot stands on other feet than the person; empty where it does not."""
+    person, robot = command.human_support, command.support
+    if person == robot:
+        return ""
+    if robot == "D":
+        return "keeps a foot down: nobody stands" if person == "F" else f"shifts its weight to the {SIDES[person]} foot"
+    return f"brings its {SIDES['R' if robot == 'L' else 'L']} foot down"
 
 
 def _delays(seconds: deque[float]) -> str:

@@ -6,7 +6,7 @@ import errno
 import select
 import socket
 import time
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from naoimitate.core.errors import StreamError
 from naoimitate.live.stream import Address
@@ -27,6 +27,20 @@ class Datagram(NamedTuple):
     payload: bytes
 
 
+class Source(Protocol):
+    """Where datagrams come from."""
+
+    @property
+    def ended(self) -> bool:
+        """Whether nothing will ever come again."""
+
+    def wait(self, timeout: float) -> bool:
+        """Wait at most ``timeout`` s for a datagram; whether one is there."""
+
+    def read(self) -> list[Datagram]:
+        """What has come since the last call."""
+
+
 class Receiver:
     """Listens on one address and port. Raises StreamError where it cannot."""
 
@@ -41,6 +55,7 @@ class Receiver:
             raise StreamError(_why(error, bind, port)) from error
         self._socket.setblocking(False)
         self.port: int = self._socket.getsockname()[1]
+        self.ended = False
 
     def wait(self, timeout: float) -> bool:
         """Wait at most ``timeout`` s for a datagram; whether one is there."""

@@ -1,6 +1,6 @@
-"""A recording of a live session: every datagram with its arrival, and the clock of every step.
+"""A recording of a live session: every datagram with its arrival, what the operator did, the clock of every step.
 
-A line of JSON says what it is; then come records, each a kind, a time, and for datagrams the sender and the bytes. A
+A line of JSON says what it is and how the session was set up; then come records, each a kind, a time, and a content. A
 torn end is left out. Played back, the same datagrams at the same times give the same commands, bit for bit.
 """
 
@@ -8,21 +8,27 @@ from __future__ import annotations
 
 import json
 import struct
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from naoimitate.core.errors import StreamError
+from naoimitate.fsm.session import Event
+from naoimitate.live.loop import Beat, Turn
 from naoimitate.live.receiver import Datagram
-from naoimitate.live.session import Session, Tick
+from naoimitate.live.session import Session
 from naoimitate.live.stream import Stream
 
 FORMAT = "naoimitate-recording/1"
-STEP, DATAGRAM = 0, 1
+STEP, DATAGRAM, TOLD = 0, 1, 2
 _HEAD = struct.Struct("<Bd")
 _SENDER = struct.Struct("<BHI")
+_TEXTS = struct.Struct("<BH")
 LARGEST_HEADER = 65536
+LONGEST_REASON = 1000
+"""Bytes of a fault's reason."""
 
 
 class Recorder:
@@ -42,8 +48,12 @@ class Recorder:
         self._file.write(_HEAD.pack(DATAGRAM, datagram.arrival))
         self._file.write(_SENDER.pack(len(host), datagram.address[1], len(datagram.payload)) + host + datagram.payload)
 
-    def step(self, now: float) -> None:
-        """A step of the session; twice a second everything so far is handed to the system."""
+    def beat(self, beat: Beat) -> None:
+        """A turn of the loop; twice a second everything so far is handed to the system."""
+        now = beat.turn.now
+        for event, reason in beat.tick.told:
+            word, why = event.value.encode(), reason.encode()[:LONGEST_REASON]
+            self._file.write(_HEAD.pack(TOLD, now) + _TEXTS.pack(len(word), len(why)) + word + why)
         self._file.write(_HEAD.pack(STEP, now))
         if now - self._flushed > 0.5:
             self._file.flush()
@@ -54,12 +64,25 @@ class Recorder:
         self._file.close()
 
 
+class Told(NamedTuple):
+    """What a session was told by its operator or its driver; see ``Session.tell``."""
+
+    event: Event
+    reason: str
+
+
+class Step(NamedTuple):
+    """A step of a session, and when (s) it was."""
+
+    now: float
+
+
 @dataclass(frozen=True)
 class Recording:
-    """header: what the recorder was told. events: a datagram, or the time (s) of a step, in order."""
+    """header: what the recorder was told. events: what happened, in order."""
 
     header: dict[str, Any]
-    events: list[Datagram | float]
+    events: list[Datagram | Told | Step]
 
 
 def read_recording(path: Path) -> Recording:
@@ -68,42 +91,81 @@ def read_recording(path: Path) -> Recording:
         data = path.read_bytes()
     except OSError as error:
         raise StreamError(f"cannot read {path}: {error.strerror}") from error
-    end = data.find(b"\n", 0, LARGEST_HEADER)
-    try:
-        header = json.loads(data[:end]) if end > 0 else {}
-    except (ValueError, RecursionError):
-        header = {}
-    if not isinstance(header, dict) or header.get("format") != FORMAT:
+    header = _header(data)
+    if header is None:
         raise StreamError(f"{path} is no recording of a session: make one with 'naoimitate live --record'")
-    return Recording(header, list(_events(data, end + 1)))
+    try:
+        return Recording(header, list(_events(data, data.find(b"\n") + 1)))
+    except ValueError as error:
+        raise StreamError(f"{path} is damaged ({error}): nothing of it can be trusted") from error
 
 
-def _events(data: bytes, at: int) -> Iterator[Datagram | float]:
-    while at + _HEAD.size <= len(data):
-        kind, time = _HEAD.unpack_from(data, at)
-        at += _HEAD.size
-        if kind == STEP:
-            yield time
-            continue
-        if kind != DATAGRAM or at + _SENDER.size > len(data):
-            return
-        host, port, size = _SENDER.unpack_from(data, at)
-        at += _SENDER.size
-        if at + host + size > len(data):
-            return
-        name = data[at : at + host].decode(errors="replace")
-        yield Datagram(time, (name, port), data[at + host : at + host + size])
-        at += host + size
+def is_recording(path: Path) -> bool:
+    """Whether a file begins like a recording."""
+    try:
+        with path.open("rb") as file:
+            return _header(file.read(LARGEST_HEADER)) is not None
+    except OSError:
+        return False
 
 
-def play(recording: Recording, session: Session, stream: Stream) -> Iterator[tuple[float, Tick]]:
-    """The ticks of a recorded session again, with their times."""
+def play(recording: Recording, session: Session, stream: Stream) -> Iterator[Turn]:
+    """The turns of a recorded session again, as fast as the computer can."""
     session.start()
     for event in recording.events:
         if isinstance(event, Datagram):
             stream.take(event.arrival, event.address, event.payload)
+        elif isinstance(event, Told):
+            session.tell(event.event, event.reason)
+        else:
+            newest = stream.newest()
+            if newest is not None:
+                session.see(newest[1].frame, newest[0])
+            started = time.perf_counter()
+            tick = session.step(event.now)
+            yield Turn(tick, event.now, imitate=time.perf_counter() - started)
+
+
+def paced(turns: Iterator[Turn]) -> Iterator[Turn]:
+    """Turns of another time, each when it is due counted from the first one."""
+    begin = first = 0.0
+    for turn in turns:
+        begin, first = (begin, first) if begin else (time.monotonic(), turn.now)
+        time.sleep(max(0.0, begin + turn.now - first - time.monotonic()))
+        yield turn
+
+
+def _header(data: bytes) -> dict[str, Any] | None:
+    """The first line of a recording; None where there is none."""
+    end = data.find(b"\n", 0, LARGEST_HEADER)
+    try:
+        header = json.loads(data[:end]) if end > 0 else None
+    except (ValueError, RecursionError):
+        return None
+    return header if isinstance(header, dict) and header.get("format") == FORMAT else None
+
+
+def _events(data: bytes, at: int) -> Iterator[Datagram | Told | Step]:
+    """Everything up to a torn end. Raises ValueError for what nobody has written."""
+    while at + _HEAD.size <= len(data):
+        kind, moment = _HEAD.unpack_from(data, at)
+        at += _HEAD.size
+        if kind == STEP:
+            yield Step(moment)
             continue
-        newest = stream.newest()
-        if newest is not None:
-            session.see(newest[1].frame, newest[0])
-        yield event, session.step(event)
+        if kind not in (DATAGRAM, TOLD):
+            raise ValueError(f"a record of kind {kind}")
+        form = _SENDER if kind == DATAGRAM else _TEXTS
+        if at + form.size > len(data):
+            return
+        sizes = form.unpack_from(data, at)
+        at += form.size
+        lengths = (sizes[0], sizes[-1])
+        if at + sum(lengths) > len(data):
+            return
+        first, second = data[at : at + lengths[0]], data[at + lengths[0] : at + sum(lengths)]
+        at += sum(lengths)
+        if kind == TOLD:
+            yield Told(Event(first.decode(errors="replace")), second.decode(errors="replace"))
+        else:
+            yield Datagram(moment, (first.decode(errors="replace"), sizes[1]), second)

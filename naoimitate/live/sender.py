@@ -14,6 +14,8 @@ from naoimitate.core.errors import StreamError
 from naoimitate.live.performance import Performance
 from naoimitate.live.sample import Encoder
 
+DEFAULT_RATE = 60.0
+"""Hz, where the motion is a single frame."""
 HELD_BACK = (1.0, 3.0)
 """Intervals between frames by which a datagram comes late that is to be overtaken, from and to."""
 

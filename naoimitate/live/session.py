@@ -51,7 +51,8 @@ class Tick:
     """One step of a session.
 
     command: for the driver. state: of the session machine. arrival: s, of the newest frame of the operator that this
-    command uses, NaN unless tracking. fresh: whether a frame caused the step. began: whether a run begins here.
+    command uses, NaN unless tracking. fresh: whether a frame caused the step. began: whether a run begins here. told:
+    what the session was told since the last step, with reasons.
     """
 
     command: RobotCommand
@@ -59,6 +60,7 @@ class Tick:
     arrival: float
     fresh: bool
     began: bool
+    told: tuple[tuple[Event, str], ...] = ()
 
 
 _STANDING = (State.IDLE, State.WAITING, State.RETURNING)
@@ -88,9 +90,11 @@ class Session:
         self._person: HumanFrame | None = None
         self._kept: HumanFrame | None = None
         self._fresh: HumanFrame | None = None
-        self._arrival, self._now = -math.inf, math.nan
+        self._arrival, self._now, self._dt = -math.inf, math.nan, 0.01
         self._played = ""
-        self._began = False
+        self._caused = self._began = False
+        self._upper_body = self.imitator.upper_body
+        self._told: list[tuple[Event, str]] = []
 
     @property
     def state(self) -> State:
@@ -117,9 +121,7 @@ class Session:
 
     def start(self) -> None:
         """The robot stands in its posture ``stand``, connected."""
-        self.imitator.use(self._stand_in)
-        self.imitator.stand()
-        self._played = "standing"
+        self._stand()
         self._take(Event.START)
 
     def see(self, frame: HumanFrame, arrival: float) -> None:
@@ -129,48 +131,54 @@ class Session:
             frame = mirrored_frame(frame)
         self._fresh, self._arrival = frame, arrival
 
-    def clutch(self) -> None:
-        """The operator pauses, or goes on."""
-        self._watch.reset()
-        self._take(Event.CLUTCH)
+    def tell(self, event: Event, reason: str = "") -> None:
+        """What no frame says: the operator's ``CLUTCH``, ``BODY``, ``RESET`` and ``STOP``, the robot's ``FAULT``.
 
-    def fault(self, reason: str) -> None:
-        """Something forbids to go on."""
-        self.reason = reason
-        self._take(Event.FAULT)
+        reason: of a fault. After a reset the robot stands in its posture ``stand`` again.
+        """
+        self._told.append((event, reason))
+        action = self._take(event)
+        if event is Event.CLUTCH:
+            self._watch.reset()
+        elif event is Event.BODY and action is not None:
+            self._upper_body = not self._upper_body
+        elif event is Event.FAULT and action is not None:
+            self.reason = reason
+        elif event is Event.RESET and action is not None:
+            self._stand()
 
-    def reset(self) -> None:
-        """After a fault: the robot stands in its posture ``stand`` again."""
-        if self._take(Event.RESET) is not None:
-            self.start_again()
-
-    def start_again(self) -> None:
-        """Imitate the stand-in from the robot's own stand."""
+    def _stand(self) -> None:
+        """Imitate the stand-in, from the robot's own stand."""
         self.imitator.use(self._stand_in)
         self.imitator.stand()
         self._played, self._person, self.reason = "standing", None, ""
         self._arrival = -math.inf
 
-    def stop(self) -> None:
-        """The end."""
-        self._take(Event.STOP)
-
     def step(self, now: float) -> Tick:
-        """The next command, at ``now`` s."""
-        fresh, self._began = self._fresh, False
-        dt = now - self._now if math.isfinite(self._now) else 0.01
-        self._now, self._fresh = now, None
+        """The next command, at ``now`` s: ``observe``, then ``imitate``."""
+        self.observe(now)
+        return self.imitate()
+
+    def observe(self, now: float) -> None:
+        """What the newest frame, or its absence, means at ``now`` s; ``imitate`` follows."""
+        fresh = self._fresh
+        self._dt = now - self._now if math.isfinite(self._now) else 0.01
+        self._now, self._fresh, self._caused, self._began = now, None, fresh is not None, False
         if fresh is not None:
             self._observe(fresh)
         else:
             self._miss(now)
-        command = self._imitate(now, fresh is not None, dt)
+
+    def imitate(self) -> Tick:
+        """The command for the moment that was observed."""
+        command = self._command(self._now, self._caused, self._dt)
         if self.state is State.BLENDING and not self.imitator.blending:
             self._take(Event.BLENDED)
         if self.state is State.RETURNING and not self.imitator.blending and command.support == "D":
             self._take(Event.STANDING)
         arrival = self._arrival if self.state is State.TRACKING else math.nan
-        return Tick(command, self.state, arrival, fresh is not None and self.state in _OPERATED, self._began)
+        told, self._told = tuple(self._told), []
+        return Tick(command, self.state, arrival, self._caused and self.state in _OPERATED, self._began, told)
 
     def _observe(self, frame: HumanFrame) -> None:
         """Take a frame of the operator: filtered, watched for a T-pose, and told to the machine."""
@@ -208,7 +216,7 @@ class Session:
             self._kept = self._person
         return action
 
-    def _imitate(self, now: float, fresh: bool, dt: float) -> RobotCommand:
+    def _command(self, now: float, fresh: bool, dt: float) -> RobotCommand:
         """One step of the imitator, of whom the state says."""
         if self.state in _OPERATED or (self.state in _KEPT and self._played == "operator"):
             assert self._person is not None and self.subject is not None
@@ -222,7 +230,7 @@ class Session:
         """Imitate somebody from now on, from where the robot is."""
         if self._played == who:
             return
-        self._played = who
+        self._played, self.imitator.upper_body = who, self._upper_body
         self.imitator.turn_to(subject)
         self.imitator.blend(duration)
 

@@ -100,14 +100,18 @@ class Stream:
         return sum(abs(gap - mean) for gap in gaps) / len(gaps) if gaps else 0.0
 
     def complaint(self) -> str:
-        """What is wrong with what comes, in a sentence; empty where it is understood."""
-        c = self.counts
-        if c.frames or not c.damaged:
+        """What is wrong with what comes, in a sentence; empty where it is understood, or nothing comes."""
+        c, title = self.counts, self._protocol.title
+        if c.frames or not c.datagrams:
             return ""
         if c.others:
-            other = max(c.others, key=lambda title: c.others[title])
-            return f"this looks like {other}, not {self._protocol.title}: choose its --source"
-        return f"{c.damaged} datagrams came that are not {self._protocol.title}: look at the sender's protocol"
+            other = max(c.others, key=lambda other: c.others[other])
+            return f"this looks like {other}, not {title}: choose its --source"
+        if c.damaged:
+            return f"{c.damaged} datagrams came that are not {title}: look at the sender's protocol"
+        if c.foreign:
+            return f"{c.foreign} datagrams came, none of them from {self._allow}: look at --allow"
+        return f"{title} comes, but no whole person of it: let the sender stream poses, and of the first person"
 
     def _listens_to(self, arrival: float, address: Address) -> bool:
         if self._allow is not None and address[0] != self._allow:
