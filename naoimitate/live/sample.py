@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
-from naoimitate.core.frames import HumanFrame
+import numpy as np
+
+from naoimitate.core.frames import LANDMARK, HumanFrame
 
 LARGEST = 262144
 """Bytes that a packed payload may grow to: 256 kB."""
@@ -58,3 +60,13 @@ class StreamProtocol:
     decoder: Callable[[], Decoder]
     encoder: Callable[[], Encoder]
     recognises: Callable[[bytes], bool]
+
+
+def with_pelvis(frame: HumanFrame) -> HumanFrame:
+    """The frame, its pelvis between the hips where the sender has none."""
+    p = frame.landmarks
+    if np.isfinite(p[LANDMARK["pelvis"]]).all():
+        return frame
+    p = np.array(p, dtype=np.float64)
+    p[LANDMARK["pelvis"]] = 0.5 * (p[LANDMARK["l_hip"]] + p[LANDMARK["r_hip"]])
+    return replace(frame, landmarks=p)

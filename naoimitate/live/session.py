@@ -10,16 +10,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from naoimitate.calib.subject import Subject, calibrate
 from naoimitate.core.errors import CalibrationError
-from naoimitate.core.frames import LANDMARK, HumanFrame, RobotCommand
+from naoimitate.core.frames import HumanFrame, RobotCommand
 from naoimitate.fsm.session import Action, Event, SessionFsm, State
 from naoimitate.human.mirror import mirrored_frame
 from naoimitate.imitator import Imitator
 from naoimitate.live.clock import SenderClock
 from naoimitate.live.filter import LandmarkFilter
+from naoimitate.live.sample import with_pelvis
 from naoimitate.live.tpose import TPoseWatch
 from naoimitate.motion.builtin import relaxed, tpose
 from naoimitate.robot.model import RobotModel
@@ -126,7 +125,7 @@ class Session:
 
     def see(self, frame: HumanFrame, arrival: float) -> None:
         """The newest frame of the operator, its time on the sender's clock (NaN: not told), and when it came."""
-        frame = _with_pelvis(replace(frame, time=self._clock.moment(frame.time, arrival)))
+        frame = with_pelvis(replace(frame, time=self._clock.moment(frame.time, arrival)))
         if self._live.mirror:
             frame = mirrored_frame(frame)
         self._fresh, self._arrival = frame, arrival
@@ -241,13 +240,3 @@ class Session:
         if fresh or not self._live.filtered or self.state in _KEPT:
             return person
         return self._filter.predicted(min(now, person.time + self._live.predict), person)
-
-
-def _with_pelvis(frame: HumanFrame) -> HumanFrame:
-    """The frame, its pelvis between the hips where the sender has none."""
-    p = frame.landmarks
-    if np.isfinite(p[LANDMARK["pelvis"]]).all():
-        return frame
-    p = np.array(p, dtype=np.float64)
-    p[LANDMARK["pelvis"]] = 0.5 * (p[LANDMARK["l_hip"]] + p[LANDMARK["r_hip"]])
-    return replace(frame, landmarks=p)
