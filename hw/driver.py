@@ -53,7 +53,11 @@ class Driver(Protocol):
         """Time between two uses of the newest command, s."""
 
     def connect(self) -> None:
-        """Find the robot and switch its servos on where it stands; NaoimitateError says what to do if it cannot."""
+        """Find the robot, switch its servos on where it is, and bring it to its posture ``stand``; returns there.
+
+        A session begins from that posture. Takes as long as it needs; NaoimitateError says what to do if it cannot be
+        done.
+        """
 
     def read(self) -> RobotState:
         """Return the newest state; never blocks."""

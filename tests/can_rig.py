@@ -21,7 +21,7 @@ from naoimitate.hw.can.stub_faults import parse_fault
 from naoimitate.robot import RobotModel
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
-QUICK = CanSettings(ramp=0.1, patience=0.5)
+QUICK = CanSettings(ramp=0.1, patience=0.5, approach=20.0)
 _CHANNELS = itertools.count()
 
 

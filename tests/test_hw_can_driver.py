@@ -34,23 +34,6 @@ def test_it_is_a_driver(nao: RobotModel) -> None:
     assert isinstance(CanDriver(nao, interface="virtual", channel="unused", compensation=False), Driver)
 
 
-def test_it_takes_the_present_position_as_first_target_and_nothing_jumps(nao: RobotModel) -> None:
-    """Wherever the motors are, outside the limits too."""
-    with rig(nao, compensation=False) as it:
-        rng = np.random.default_rng(3)
-        for motor in it.stub.motors.values():
-            motor.position = float(rng.uniform(-2.5, 2.5))
-        before = positions(it)
-        it.driver.connect()
-        time.sleep(0.05)
-        frames = it.frames()
-        for node, motor in it.stub.motors.items():
-            follow = [values for _, values in commands_to(frames, node) if values["mode"] == "follow"]
-            assert follow and all(abs(values["position"] - before[node]) <= STEP for values in follow)
-            assert abs(motor.position - before[node]) <= STEP
-            assert motor.status == "following" and motor.stiffness == 1.0
-
-
 def test_it_only_asks_before_every_motor_has_answered(nao: RobotModel) -> None:
     with rig(nao, "7:silent@0", compensation=False) as it:
         with pytest.raises(DriverError, match=r"motor 7 \(LWristYaw\): no answer on virtual"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -13,6 +14,7 @@ import numpy as np
 from naoimitate.calib.zeros import JointZeros
 from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import Array, RobotCommand
+from naoimitate.hw.approach import AWAY, Approach
 from naoimitate.hw.can.bus import open_bus
 from naoimitate.hw.can.bus_load import check_load
 from naoimitate.hw.can.codec import Codec, Targets
@@ -21,9 +23,10 @@ from naoimitate.hw.can.health import Counts, Health
 from naoimitate.hw.can.joints import HAND, read_joint_map
 from naoimitate.hw.can.link import Link
 from naoimitate.hw.can.setpoint import Setpoint
-from naoimitate.hw.can.startup import Startup
+from naoimitate.hw.can.startup import INTERRUPTED, Startup
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import RobotState
+from naoimitate.hw.lean import UPRIGHT
 from naoimitate.robot.model import RobotModel
 
 USUAL_BITRATE = 1_000_000
@@ -41,7 +44,9 @@ class CanSettings:
     ramp: float = 1.0
     """s in which the stiffness goes from 0 to full after switching on, and back before switching off."""
     patience: float = 1.0
-    """s to wait for the motors' answers at the start."""
+    """s to wait for the motors' answers at the start, and for the last motor to arrive at the posture ``stand``."""
+    approach: float = 0.3
+    """rad/s, highest speed of the farthest joint on the way to the posture ``stand``."""
 
 
 DEFAULT = CanSettings()
@@ -62,7 +67,8 @@ class CanDriver:
     interface, channel: as python-can names them (``socketcan``, ``can0``). codec: ``dbc`` or an object that follows
     ``Codec``. compensation: add what the servos need against gravity. period: s, None = the database's cycle time.
     bitrate: bit/s, None = robot.yaml's. database: DBC file instead of the robot's own. zeros: how far this
-    specimen's encoders are off. Raises DriverError where robot.yaml, database and bus load do not allow driving.
+    specimen's encoders are off. notice: told, a sentence each, what the operator should know beforehand.
+    Raises DriverError where robot.yaml, database and bus load do not allow driving.
     """
 
     def __init__(
@@ -78,21 +84,26 @@ class CanDriver:
         database: Path | None = None,
         zeros: JointZeros | None = None,
         settings: CanSettings = DEFAULT,
+        notice: Callable[[str], None] = lambda sentence: None,
     ) -> None:
-        self._interface, self._channel, self._settings = interface, channel, settings
+        self._interface, self._channel, self._settings, self._notice = interface, channel, settings, notice
         self._map = read_joint_map(robot, zeros)
         self._codec = make_codec(codec, robot, self._map, database) if isinstance(codec, str) else codec
         self._period = self._codec.period if period is None else period
         self._bitrate = int(robot.data["can"].get("bitrate", USUAL_BITRATE)) if bitrate is None else bitrate
         self.load = check_load(self._codec.traffic(self._period), self._bitrate, self._period)
+        self._stand = _Target(robot.postures["stand"], UPRIGHT, "D", np.full(2, np.nan))
         self._compensation = GravityCompensation(robot) if compensation else None
         if self._compensation is not None:  # compile it before a robot waits for it
-            self._compensation.torque(robot.postures["stand"], np.array([1.0, 0.0, 0.0, 0.0]), "D")
+            self._compensation.torque(self._stand.q, UPRIGHT, "D")
         self._speed = np.abs(self._map.factor) * self._map.speed * settings.speed
         self._health = Health(self._map)
         self._link: Link | None = None
         self._thread: threading.Thread | None = None
         self._halt, self._ramped = threading.Event(), threading.Event()
+        self._starting, self._letting_go = False, threading.RLock()
+        self._approach: Approach | None = None
+        self._along = 0.0
         self._target: _Target | None = None
         self._led: _Target | None = None
         self._share, self._wanted, self._emergency = 0.0, 1.0, False
@@ -109,26 +120,28 @@ class CanDriver:
         return self._health.counts
 
     def connect(self) -> None:
-        """Find every motor, switch on where the robot is, and raise the stiffness; returns when it is up.
+        """Find every motor, switch on where it is, raise the stiffness, and lead the robot slowly to ``stand``.
 
         A robot that still holds itself, because its last host died, keeps its stiffness. After an emergency stop the
-        motors are off for a moment: hold the robot. Raises DriverError when the bus or a motor cannot be used.
+        motors are off for a moment: hold the robot. ``stop`` and ``emergency_stop`` from another thread or a signal
+        handler end it at once. Raises DriverError when the bus or a motor cannot be used, and names the motors that do
+        not arrive; the robot is let go of then.
         """
         self.stop()
+        self._halt, self._starting, self._emergency = threading.Event(), True, False
         self._health = Health(self._map)
         self._start = time.monotonic()
-        link = Link(open_bus(self._interface, self._channel, self._bitrate), self._codec, self._health)
         try:
+            link = self._link = Link(open_bus(self._interface, self._channel, self._bitrate), self._codec, self._health)
             self._switch_on(link)
+            self._thread = threading.Thread(target=self._run, args=(link,), name="can", daemon=True)
+            self._thread.start()
+            self._starting = False
+            self._go_to_stand(link)
         except BaseException:
-            link.close()
+            self._starting = False
+            self.stop()
             raise
-        self._link = link
-        self._halt.clear()
-        self._ramped.clear()
-        self._thread = threading.Thread(target=self._run, args=(link,), name="can", daemon=True)
-        self._thread.start()
-        self._ramped.wait(self._settings.ramp + self._settings.patience)
 
     def read(self) -> RobotState:
         """Return the newest answers of the motors; NaN for what they do not measure."""
@@ -164,26 +177,33 @@ class CanDriver:
     def emergency_stop(self) -> None:
         """Stop every motor where it is, at once and over everything else; only ``stop`` and ``connect`` end it."""
         self._emergency = True
-        if self._link is not None:
-            self._link.send(self._codec.emergency_stop())
+        link = self._link
+        if link is not None:
+            link.send(self._codec.emergency_stop())
+        if self._starting:
+            self._halt.set()
 
     def stop(self) -> None:
         """Hold, let the stiffness go down to 0, and switch the motors off; may be called twice."""
         self._halt.set()
-        if self._thread is not None:
-            self._thread.join()
-            self._thread = None
-        if self._link is not None:
-            self._link.close()
-            self._link = None
+        if self._starting:  # ``connect`` sees it within a period, and lets go of what it has switched on
+            return
+        with self._letting_go:
+            if self._thread is not None:
+                self._thread.join()
+                self._thread = None
+            link, self._link = self._link, None
+            if link is not None:
+                link.close()
 
     def _switch_on(self, link: Link) -> None:
         """The motors follow their own positions, with as much stiffness as they already had."""
-        startup = Startup(link, self._codec, self._health, self._map, self._period, self._settings.patience)
+        startup = Startup(link, self._codec, self._health, self._map, self._halt, self._period, self._settings.patience)
         standing = startup.find(f"{self._interface} {self._channel}")
         startup.clear()
-        self._share, self._wanted, self._emergency = float(standing), 1.0, False
-        self._target = self._led = None
+        self._share, self._wanted = float(standing), 1.0
+        self._target = self._led = self._approach = None
+        self._ramped.clear()
         try:
             startup.switch_on(self._targets)
         except BaseException:
@@ -194,6 +214,34 @@ class CanDriver:
         speed = self._map.speed * self._settings.speed
         self._setpoint = Setpoint(start, self._map.lower, self._map.upper, speed)
         self._goal = start
+
+    def _go_to_stand(self, link: Link) -> None:
+        """Lead the motors to the posture ``stand`` once they are stiff; hands stay where they are."""
+        self._await(self._ramped.is_set, self._settings.ramp + self._settings.patience)
+        goal = self._servo_angles(self._stand)
+        speed = np.minimum(self._settings.approach, self._map.speed * self._settings.speed)
+        way = Approach(self._setpoint.angles, np.clip(goal, self._map.lower, self._map.upper), speed)
+        if way.far:
+            self._notice(way.notice)
+        self._along, self._approach = 0.0, way
+
+        def away() -> Array:
+            error = np.abs(goal - self._map.from_motor(link.position))
+            return np.where(self._map.joint == HAND, 0.0, error)
+
+        self._await(lambda: self._along >= way.duration, 2.0 * way.duration + self._settings.patience)
+        if not self._await(lambda: bool((away() <= AWAY).all()), self._settings.patience):
+            late = [f"{self._map.title(int(i))} ({away()[i]:.2f} rad away)" for i in np.flatnonzero(~(away() <= AWAY))]
+            raise DriverError(f"{', '.join(late)}: did not arrive at the stand posture; look for what blocks it")
+        self._approach = None
+
+    def _await(self, true: Callable[[], bool], patience: float) -> bool:
+        """Wait while the sending thread works; DriverError when somebody stops the robot meanwhile."""
+        end = time.monotonic() + patience
+        while not true() and time.monotonic() < end:
+            if self._halt.wait(self._period) or self._emergency:
+                raise DriverError(INTERRUPTED)
+        return true()
 
     def _run(self, link: Link) -> None:
         """The sending thread: a cycle every period, then the way to rest."""
@@ -226,8 +274,12 @@ class CanDriver:
         self._health.follow(None if soft else angles - self._map.from_motor(link.position), now)
 
     def _lead(self, dt: float) -> None:
-        """Move the setpoint towards the newest command; without one it stays."""
-        target = self._target
+        """Move the setpoint on its way to ``stand``, later towards the newest command; without one it stays."""
+        way, target = self._approach, self._target
+        if way is not None:
+            self._along += dt
+            self._setpoint.angles = way.at(self._along)
+            return
         if target is None:
             return
         if target is not self._led:

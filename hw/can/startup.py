@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable
 
@@ -15,15 +16,28 @@ from naoimitate.hw.can.health import Health
 from naoimitate.hw.can.joints import JointMap
 from naoimitate.hw.can.link import Link
 
+INTERRUPTED = "stopped while the robot was being connected"
+"""What a start says that somebody has ended."""
+
 
 class Startup:
-    """One attempt to switch the motors on; period: s between frames, patience: s that a step may take."""
+    """One attempt to switch the motors on; period: s between frames, patience: s that a step may take.
+
+    halt: ends it within a period, with a DriverError.
+    """
 
     def __init__(
-        self, link: Link, codec: Codec, health: Health, joint_map: JointMap, period: float, patience: float
+        self,
+        link: Link,
+        codec: Codec,
+        health: Health,
+        joint_map: JointMap,
+        halt: threading.Event,
+        period: float,
+        patience: float,
     ) -> None:
         self._link, self._codec, self._health, self._map = link, codec, health, joint_map
-        self._period, self._patience = period, patience
+        self._halt, self._period, self._patience = halt, period, patience
 
     def find(self, where: str) -> bool:
         """Wait until every motor has answered; returns whether they already carry the robot.
@@ -61,8 +75,10 @@ class Startup:
         """Send frames every period until it is done, or the patience is at its end."""
         end = time.monotonic() + self._patience
         while time.monotonic() < end:
+            if self._halt.is_set():
+                raise DriverError(INTERRUPTED)
             self._link.send([*self._codec.heartbeat(), *frames()])
-            time.sleep(self._period)
+            self._halt.wait(self._period)
             if done():
                 return True
         return False
