@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import Array
 from naoimitate.human.tracks import minimum_jerk
 
@@ -40,3 +42,10 @@ class Approach:
     def notice(self) -> str:
         """What to tell the operator beforehand."""
         return f"moving to the stand posture within {math.ceil(self.duration)} s: hold the robot"
+
+
+def check_arrival(names: Sequence[str], away: Array) -> None:
+    """DriverError that names those of ``names`` (N) which are too far ``away`` (N,) rad from their goal, or unknown."""
+    late = [f"{name} ({off:.2f} rad away)" for name, off in zip(names, away, strict=True) if not off <= AWAY]
+    if late:
+        raise DriverError(f"{', '.join(late)}: did not arrive at the stand posture; look for what blocks it")

@@ -13,6 +13,8 @@ from naoimitate.core.frames import Array, RobotCommand
 
 FSR_NAMES = ("front_left", "front_right", "rear_left", "rear_right")
 """Columns of ``RobotState.fsr``, seen from above with the toes up; rows are the left and the right foot."""
+INTERRUPTED = "stopped while the robot was being connected"
+"""What a start says that somebody has ended."""
 
 
 @dataclass(frozen=True)

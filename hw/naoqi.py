@@ -21,7 +21,7 @@ from naoimitate.calib.zeros import JointZeros, no_zeros
 from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import SIDES, Array, RobotCommand
 from naoimitate.hw.compensation import GravityCompensation
-from naoimitate.hw.driver import RobotState
+from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.hw.naoqi_link import NaoqiLink
 from naoimitate.hw.naoqi_senses import accelerometer_sign, blank, keys, state
@@ -30,9 +30,11 @@ from naoimitate.hw.naoqi_start import (
     check_body,
     check_posture,
     check_version,
+    go_to,
     keep_reflexes,
     posture_family,
     quieten,
+    stand_up,
     wake,
 )
 from naoimitate.robot.model import RobotModel
@@ -68,6 +70,8 @@ class NaoqiSettings:
     """[s] from no stiffness to the full one."""
     stand_speed: float = 0.5
     """Share of the speed with which it stands up."""
+    approach: float = 0.3
+    """[rad/s] Highest speed of the farthest joint on the way from NAOqi's stand to the model's posture ``stand``."""
     servo_stiffness: float | None = None
     """[N m/rad] of the servos, for gravity compensation; None = none, since nobody publishes it: measure it first."""
 
@@ -101,9 +105,13 @@ class NaoqiDriver:
         return self._settings.period
 
     def connect(self) -> None:
-        """Find the robot, check it, wake it up and let it stand. Takes some seconds; DriverError says what to do."""
+        """Find the robot, check it, wake it up and bring it to the model's posture ``stand``.
+
+        Takes some seconds; ``stop`` and ``emergency_stop`` end it. DriverError says what to do.
+        """
         self.stop()
-        s = self._settings
+        s, halt = self._settings, threading.Event()
+        self._halt = halt
         link = NaoqiLink(s.url, s.user, s.password, s.patience)
         try:
             check_version(link)
@@ -111,17 +119,18 @@ class NaoqiDriver:
             check_posture(link)
             quieten(link, self._notice)
             keep_reflexes(link, self._notice)
-        except DriverError:
+            self._go_on()
+        except BaseException:
             link.close()
             raise
-        self._link, self._halt = link, threading.Event()  # from here on ``stop`` has something to stop
+        self._link = link  # from here on ``stop`` has something to stop
         try:
-            wake(link, s.stiffness, s.ramp, s.stand_speed)
+            self._wake(link)
             self._start_from(link)
-        except DriverError:
+        except BaseException:
             self.stop()
             raise
-        self._thread = threading.Thread(target=self._run, args=(link, self._halt), name="naoqi", daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(link, halt), name="naoqi", daemon=True)
         self._thread.start()
 
     def read(self) -> RobotState:
@@ -174,6 +183,23 @@ class NaoqiDriver:
             link.call("ALMotion", "rest", patience=20.0)
         else:
             link.call("ALMotion", "setStiffnesses", "Body", 0.0)
+
+    def _wake(self, link: NaoqiLink) -> None:
+        """Servos on, up, and to the posture ``stand``, unless somebody stops the robot on the way."""
+        s, robot = self._settings, self._robot
+        stand = np.clip(self._zeros.to_servos(robot.postures["stand"]), robot.lower, robot.upper)
+        self._go_on()
+        wake(link, s.stiffness, s.ramp)
+        self._go_on()
+        stand_up(link, s.stand_speed)
+        self._go_on()
+        go_to(link, self._names, stand, s.approach, self._notice)
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """DriverError once somebody has stopped the robot while it is being connected."""
+        if self._halt.is_set():
+            raise DriverError(INTERRUPTED)
 
     def _start_from(self, link: NaoqiLink) -> None:
         """The robot's first state, its speeds, and no target."""

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
+
 from naoimitate.core.errors import DriverError
+from naoimitate.core.frames import Array
+from naoimitate.hw.approach import Approach, check_arrival
 from naoimitate.hw.naoqi_link import NaoqiLink
 
 OLDEST, NEWEST = (2, 1), (2, 9)
@@ -12,6 +16,9 @@ OLDEST, NEWEST = (2, 1), (2, 9)
 
 ON_ITS_FEET = ("Standing", "Crouching")
 """Posture families (Aldebaran, "ALRobotPosture") from which the robot may be started."""
+
+SHORTEST = 0.1
+"""[s] for the smallest way: ALMotion refuses durations of less than a few of its periods."""
 
 Notice = Callable[[str], None]
 
@@ -75,9 +82,31 @@ def keep_reflexes(link: NaoqiLink, notice: Notice) -> None:
             notice(f"{what} was off and is switched on")
 
 
-def wake(link: NaoqiLink, stiffness: float, ramp: float, speed: float) -> None:
-    """Servos on where the robot is, then stand: stiffness 0 to 1 within ``ramp`` s, speed 0 to 1."""
+def wake(link: NaoqiLink, stiffness: float, ramp: float) -> None:
+    """Servos on where the robot is: stiffness 0 to 1 within ``ramp`` s."""
     link.call("ALMotion", "stiffnessInterpolation", "Body", stiffness, ramp, patience=ramp + 10.0)
     link.call("ALMotion", "wakeUp", patience=30.0)
+
+
+def stand_up(link: NaoqiLink, speed: float) -> None:
+    """To NAOqi's own stand, which it finds its way to from every posture; speed 0 to 1."""
     if not link.call("ALRobotPosture", "goToPosture", "StandInit", speed, patience=60.0):
         raise DriverError("the robot could not stand up: is there something in its way, or is a joint too hot?")
+
+
+def go_to(link: NaoqiLink, joint_names: Sequence[str], servos: Array, speed: float, notice: Notice) -> None:
+    """From there to servo angles (J,) rad, both feet down: the farthest joint turns at ``speed`` rad/s at most.
+
+    DriverError names the joints that have not arrived.
+    """
+    names = list(joint_names)
+    here = np.array(link.call("ALMotion", "getAngles", names, True), dtype=np.float64)
+    way = Approach(here, servos, np.full(len(names), speed))
+    if way.far:
+        notice(way.notice)
+    if way.duration > 0.0:
+        duration = max(way.duration, SHORTEST)
+        times = [duration] * len(names)
+        link.call("ALMotion", "angleInterpolation", names, servos.tolist(), times, True, patience=duration + 10.0)
+    here = np.array(link.call("ALMotion", "getAngles", names, True), dtype=np.float64)
+    check_arrival(names, np.abs(servos - here))

@@ -44,6 +44,14 @@ class _Motion:
     def stiffnessInterpolation(self, name: str, stiffness: float, ramp: float) -> None:
         self._fake.did("stiffnessInterpolation", stiffness, ramp)
 
+    def angleInterpolation(self, names: list[str], angles: list[float], times: list[float], absolute: bool) -> None:
+        if not absolute or not len(names) == len(angles) == len(times):
+            raise ValueError("angleInterpolation")
+        self._fake.did("angleInterpolation", max(times))
+        if self._fake.awake.wait(5.0 if not self._fake.awake.is_set() else 0.0):
+            moved = [(n, a) for n, a in zip(names, angles, strict=True) if n not in self._fake.blocked]
+            self._fake.angles.update(moved)
+
     def setStiffnesses(self, name: str, stiffness: float) -> None:
         self._fake.did("setStiffnesses", stiffness)
 
@@ -141,6 +149,7 @@ class FakeNao:
         self.angles = dict.fromkeys(self.names, 0.0)
         self.version, self.posture, self.life = "2.8.6.23", "Standing", "disabled"
         self.offers = ["ALMotion", "ALMemory", "ALRobotPosture", "ALAutonomousLife", "ALSystem"]
+        self.blocked: list[str] = []
         self.moves_alone, self.reflexes, self.can_stand = False, True, True
         self.done: list[tuple[Any, ...]] = []
         self.sent: list[tuple[float, dict[str, float], float]] = []

@@ -28,7 +28,7 @@ from naoimitate.robot.model import Array, RobotModel
 from naoimitate.sim.placement import stand_on_floor
 
 NAO = load_robot("nao", "v4")
-INIT = NAO.postures["StandInit"]
+INIT, STAND = NAO.postures["StandInit"], NAO.postures["stand"]
 
 
 def test_without_qi_the_error_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -74,7 +74,7 @@ def command(q: Array, moment: float = 0.0, hands: tuple[float, float] | None = N
 
 
 def turned(angle: float, name: str = "HeadYaw") -> Array:
-    q = INIT.copy()
+    q = STAND.copy()
     q[NAO.joint(name)] += angle
     return q
 
@@ -90,13 +90,37 @@ def test_it_is_a_driver() -> None:
     assert isinstance(NaoqiDriver(NAO), Driver)
 
 
-def test_it_wakes_up_softly_stands_and_rests_at_the_end(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
-    driver = connect(stiffness=0.9, ramp=0.7)
-    assert fake.done == [("stiffnessInterpolation", 0.9, 0.7), ("wakeUp",), ("goToPosture", "StandInit")]
-    np.testing.assert_allclose(driver.read().q, INIT)
+def test_it_wakes_up_softly_comes_to_its_stand_and_rests_at_the_end(
+    connect: Callable[..., NaoqiDriver], fake: RemoteNao
+) -> None:
+    """NAOqi's stand is not the model's: from there it goes on to the posture in which a session begins."""
+    said: list[str] = []
+    driver = connect(stiffness=0.9, ramp=0.7, notice=said.append)
+    assert fake.done[:3] == [("stiffnessInterpolation", 0.9, 0.7), ("wakeUp",), ("goToPosture", "StandInit")]
+    name, duration = fake.done[3]
+    assert name == "angleInterpolation"
+    assert duration == pytest.approx(1.875 * np.abs(STAND - INIT).max() / NaoqiSettings().approach)
+    assert said == ["moving to the stand posture within 3 s: hold the robot"]
+    np.testing.assert_allclose(driver.read().q, STAND)
     driver.stop()
     driver.stop()
-    assert fake.done[3:] == [("killAll",), ("rest",)]
+    assert fake.done[4:] == [("killAll",), ("rest",)]
+
+
+def test_a_joint_that_does_not_arrive_is_named(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
+    fake.blocked = ["RKneePitch"]
+    with pytest.raises(DriverError, match=r"^RKneePitch \(0\.40 rad away\): did not arrive"):
+        connect()
+    assert fake.done[-1] == ("rest",)
+
+
+def test_a_session_can_begin_where_it_stands(fake: RemoteNao) -> None:
+    """The first command of a session passes the gate."""
+    guard = GuardedDriver(NaoqiDriver(NAO, NaoqiSettings(url=fake.order("serve"))), CommandGate(NAO))
+    guard.connect()
+    guard.write(command(STAND))
+    assert guard.status.accepted == 1, guard.status
+    guard.stop()
 
 
 def test_before_the_first_command_nothing_is_sent(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
@@ -110,7 +134,7 @@ def test_the_newest_command_is_sent_every_period_as_fast_as_its_step_needs(
 ) -> None:
     driver = connect()
     step, i = 0.001, 0
-    command(INIT)  # compiles
+    command(STAND)  # compiles
     begin = time.monotonic()
     while time.monotonic() < begin + 1.0:
         i += 1
@@ -121,7 +145,7 @@ def test_the_newest_command_is_sent_every_period_as_fast_as_its_step_needs(
     assert 40 <= len(times) <= 53, "one for each 20 ms, not one for each command"
     assert np.median(np.diff(times)) == pytest.approx(driver.period, abs=0.004)
     yaw, speed = np.array([a["HeadYaw"] for _, a, _ in fake.sent]), NAO.speed[NAO.joint("HeadYaw")]
-    steps = np.diff(np.concatenate([[INIT[NAO.joint("HeadYaw")]], yaw]))
+    steps = np.diff(np.concatenate([[STAND[NAO.joint("HeadYaw")]], yaw]))
     expected = np.maximum(HEADROOM * steps / (driver.period * speed), 0.01)
     np.testing.assert_allclose([fraction for _, _, fraction in fake.sent], expected, rtol=1e-6)
     assert set(fake.sent[0][1]) == set(NAO.joint_names), "both names of the shared motor too"
@@ -143,15 +167,15 @@ def test_hands_follow_their_opening_and_stay_where_there_is_none(
 ) -> None:
     driver = connect()
     for hands in ((0.8, math.nan), (0.81, math.nan), (0.2, math.nan)):
-        driver.write(command(INIT, hands=hands))
+        driver.write(command(STAND, hands=hands))
         time.sleep(0.08)
     assert [a for _, a, _ in fake.sent if "LHand" in a or "RHand" in a] == [{"LHand": 0.8}, {"LHand": 0.2}]
 
 
 def test_zeros_and_gravity_belong_to_the_servos_alone(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
-    offsets = np.full(len(INIT), 0.01)
+    offsets = np.full(len(STAND), 0.01)
     driver = connect(zeros=JointZeros("Hugo", offsets), servo_stiffness=200.0)
-    q = turned(0.1)
+    q = turned(0.1) + INIT - STAND
     driver.write(command(q))
     wait_for(lambda: len(fake.sent) >= 1)
     knee = NAO.joint("LKneePitch")
@@ -231,7 +255,7 @@ def test_what_moves_the_robot_by_itself_is_switched_off_with_a_word(
 def test_reflexes_that_are_on_are_left_alone(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
     said: list[str] = []
     connect(notice=said.append)
-    assert said == []
+    assert not [sentence for sentence in said if "hold the robot" not in sentence]
     assert not [what for what, *_ in fake.done if what.endswith("Enabled")]
 
 
@@ -338,7 +362,7 @@ def test_behind_the_guard_a_robot_that_tips_is_softened_and_let_go_of(
     driver = NaoqiDriver(NAO, NaoqiSettings(url=fake.order("serve")))
     guard = GuardedDriver(driver, CommandGate(NAO))
     guard.connect()
-    guard.write(command(INIT))
+    guard.write(command(STAND))
     assert guard.status.accepted == 1, guard.status
     fake.feels("InertialSensor/AngleY", 0.5)
     wait_for(lambda: guard.read() is not None and guard.status.condition is Condition.FALLING)

@@ -14,7 +14,7 @@ import numpy as np
 from naoimitate.calib.zeros import JointZeros
 from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import Array, RobotCommand
-from naoimitate.hw.approach import AWAY, Approach
+from naoimitate.hw.approach import AWAY, Approach, check_arrival
 from naoimitate.hw.can.bus import open_bus
 from naoimitate.hw.can.bus_load import check_load
 from naoimitate.hw.can.codec import Codec, Targets
@@ -23,9 +23,9 @@ from naoimitate.hw.can.health import Counts, Health
 from naoimitate.hw.can.joints import HAND, read_joint_map
 from naoimitate.hw.can.link import Link
 from naoimitate.hw.can.setpoint import Setpoint
-from naoimitate.hw.can.startup import INTERRUPTED, Startup
+from naoimitate.hw.can.startup import Startup
 from naoimitate.hw.compensation import GravityCompensation
-from naoimitate.hw.driver import RobotState
+from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.robot.model import RobotModel
 
@@ -230,18 +230,16 @@ class CanDriver:
             return np.where(self._map.joint == HAND, 0.0, error)
 
         self._await(lambda: self._along >= way.duration, 2.0 * way.duration + self._settings.patience)
-        if not self._await(lambda: bool((away() <= AWAY).all()), self._settings.patience):
-            late = [f"{self._map.title(int(i))} ({away()[i]:.2f} rad away)" for i in np.flatnonzero(~(away() <= AWAY))]
-            raise DriverError(f"{', '.join(late)}: did not arrive at the stand posture; look for what blocks it")
+        self._await(lambda: bool((away() <= AWAY).all()), self._settings.patience)
+        check_arrival([self._map.title(motor) for motor in range(len(self._map))], away())
         self._approach = None
 
-    def _await(self, true: Callable[[], bool], patience: float) -> bool:
+    def _await(self, true: Callable[[], bool], patience: float) -> None:
         """Wait while the sending thread works; DriverError when somebody stops the robot meanwhile."""
         end = time.monotonic() + patience
         while not true() and time.monotonic() < end:
             if self._halt.wait(self._period) or self._emergency:
                 raise DriverError(INTERRUPTED)
-        return true()
 
     def _run(self, link: Link) -> None:
         """The sending thread: a cycle every period, then the way to rest."""

@@ -15,9 +15,7 @@ from naoimitate.hw.can.codec import FAULTS, Codec, MotorStatus, Targets
 from naoimitate.hw.can.health import Health
 from naoimitate.hw.can.joints import JointMap
 from naoimitate.hw.can.link import Link
-
-INTERRUPTED = "stopped while the robot was being connected"
-"""What a start says that somebody has ended."""
+from naoimitate.hw.driver import INTERRUPTED
 
 
 class Startup:
