@@ -73,11 +73,16 @@ class MujocoDriver:
 
     def write(self, command: RobotCommand) -> None:
         """Replace the command that the servos follow from the next period on."""
-        self._target = _Target(command.q, command.base_pos, command.base_quat, command.support)
+        if not self._held:
+            self._target = _Target(command.q, command.base_pos, command.base_quat, command.support)
 
     def soften(self, share: float) -> None:
         """Turn the servos' stiffness down to a share, 0 to 1, from the next period on."""
         self._physics.soften(share)
+
+    def emergency_stop(self) -> None:
+        """Hold the present target: further commands are ignored until ``connect``."""
+        self._held = True
 
     def stop(self) -> None:
         """Stop the clock; the robot stays as it is."""
@@ -93,7 +98,8 @@ class MujocoDriver:
         return self._state
 
     def _place(self) -> None:
-        target = self._target = self._stand
+        target, self._held = self._stand, False
+        self._target = target
         self._physics.soften(1.0)
         self._physics.place(target.q, target.base_pos, target.base_quat)
         self._state = self._measure(target)
