@@ -70,5 +70,12 @@ class Driver(Protocol):
     def soften(self, share: float) -> None:
         """Turn the servos' stiffness down to a share, 0 to 1, of its normal value: after a fall, in an emergency."""
 
+    def emergency_stop(self) -> None:
+        """End all motion at once, by the fastest safe means that the robot has, and obey no command until ``connect``.
+
+        The robot stays where it is, stiff: ``soften`` and ``stop`` let go of it. Never waits; may be called at any
+        time, twice, from any thread and from a signal handler.
+        """
+
     def stop(self) -> None:
         """End the motion safely and let go of the robot; may be called twice."""

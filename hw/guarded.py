@@ -21,6 +21,8 @@ from naoimitate.fsm.fall_latch import Action, FallLatch, FallLimits
 from naoimitate.hw.driver import Driver, RobotState
 from naoimitate.hw.lean import UPRIGHT, lean
 
+GRACE = 0.05
+"""[s] that an emergency stop waits for the driver to let go of the robot; what takes longer goes on by itself."""
 NOT_LIVE = "not live"
 """Why a command is refused before ``connect`` and after the end."""
 
@@ -96,6 +98,7 @@ class GuardedDriver:
         self._lock = threading.RLock()
         self._latch = FallLatch(self._settings.fall)
         self._ended = threading.Lock()
+        self._letting_go: threading.Thread | None = None
         self._condition, self._problem = Condition.OFF, ""
         self._accepted, self._refused = 0, Counter[str]()
         self._refusing: tuple[str, ...] = ()
@@ -138,6 +141,7 @@ class GuardedDriver:
         with self._lock:
             if self._condition in (Condition.FALLING, Condition.FALLEN, Condition.EMERGENCY):
                 raise DriverError(f"{self._condition.value}: put the robot on its feet, then reset and connect again")
+            self._wait_until_let_go()
             self._latch, self._ended = FallLatch(self._settings.fall), threading.Lock()
             self._command, self._problem, self._refusing = None, "", ()
             self._condition = Condition.CONNECTING
@@ -148,6 +152,7 @@ class GuardedDriver:
                 self._end(Condition.STOPPED)
                 raise
             if self._condition is not Condition.CONNECTING:
+                self._wait_until_let_go()
                 self._try(self.__driver.stop)  # again: the driver may have gone on after the first
                 raise DriverError(f"{self._condition.value} while the robot was being connected")
             self._condition = Condition.LIVE
@@ -200,13 +205,16 @@ class GuardedDriver:
     def stop(self) -> None:
         """End the motion safely and let go of the robot; may be called twice."""
         self._end(Condition.STOPPED)
+        self._wait_until_let_go()
 
     def emergency_stop(self) -> None:
-        """No further command passes; the servos become softer; the driver lets go of the robot. May be called twice.
+        """Every motion ends at once and no command passes; the servos become softer; the robot is let go of.
 
-        The last command that passed is a stable pose, so the robot stands while it is let go of. Nothing here waits for
-        a lock: whoever holds one may be the one that is interrupted.
+        The last command that passed is a stable pose, so the robot stands meanwhile. May be called twice: the driver's
+        own emergency stop is repeated. Nothing here waits for a lock, since whoever holds one may be the one that is
+        interrupted, nor longer than ``GRACE``: another thread goes on with letting go, and ``stop`` waits for it.
         """
+        self._try(self.__driver.emergency_stop)
         self._end(Condition.EMERGENCY, self._settings.emergency_stiffness)
 
     def reset(self) -> None:
@@ -249,7 +257,18 @@ class GuardedDriver:
         self._condition = Condition.FALLEN if fell and condition is not Condition.EMERGENCY else condition
         if stiffness is not None and not fell:
             self._try(lambda: self.__driver.soften(stiffness))
-        self._try(self.__driver.stop)
+        if condition is not Condition.EMERGENCY:
+            self._try(self.__driver.stop)
+            return
+        self._letting_go = threading.Thread(target=lambda: self._try(self.__driver.stop), name="letting go")
+        self._letting_go.start()
+        self._letting_go.join(GRACE)
+
+    def _wait_until_let_go(self) -> None:
+        """Until an emergency stop has done the last of what it does."""
+        thread = self._letting_go
+        if thread is not None:
+            thread.join()
 
     def _try(self, do: Callable[[], None]) -> None:
         """Do what must not stop the rest from being done."""

@@ -157,6 +157,14 @@ class NaoqiDriver:
         if self._link is not None:
             self._link.ask("ALMotion", "setStiffnesses", "Body", float(share * self._settings.stiffness))
 
+    def emergency_stop(self) -> None:
+        """Send nothing more, and end every motion that ALMotion has under way; the robot holds where it is, stiff."""
+        self._halt.set()
+        link = self._link
+        if link is not None:
+            with contextlib.suppress(DriverError):  # a robot that is gone shows in ``read``
+                link.ask("ALMotion", "killAll")
+
     def stop(self) -> None:
         """Send nothing more; on its feet the robot crouches and rests, otherwise its servos go off as it lies."""
         with self._stopping:

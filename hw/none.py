@@ -67,6 +67,10 @@ class NoDriver:
     def soften(self, share: float) -> None:
         """There are no servos."""
 
+    def emergency_stop(self) -> None:
+        """Nothing moves; ignore all further commands."""
+        self._open = False
+
     def stop(self) -> None:
         """Ignore all further commands."""
         self._open = False

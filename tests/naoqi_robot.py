@@ -61,6 +61,7 @@ class _Motion:
 
     def rest(self) -> None:
         self._fake.did("rest")
+        self._fake.resting.wait(5.0)
 
     def killAll(self) -> None:
         self._fake.did("killAll")
@@ -157,6 +158,8 @@ class FakeNao:
         self.answering.set()
         self.awake = threading.Event()
         self.awake.set()
+        self.resting = threading.Event()
+        self.resting.set()
         self.memory = self._standing()
         self._session: Any = None
 

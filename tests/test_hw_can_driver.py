@@ -11,11 +11,13 @@ import numpy as np
 import pytest
 from can_rig import QUICK, UPRIGHT, Rig, command, rig, wait_for
 
+from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError
 from naoimitate.hw.can import CanDriver, CanSettings
 from naoimitate.hw.can.joints import read_joint_map
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import Driver
+from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.robot import RobotModel
 
 STEP = 0.0002
@@ -192,6 +194,25 @@ def test_the_emergency_stop_ends_every_motion_and_is_over_after_a_new_start(nao:
         it.driver.connect()
         assert {motor.status for motor in it.stub.motors.values()} == {"following"}
         assert it.driver.read().alarms == ()
+
+
+def test_behind_the_guard_the_emergency_stop_is_on_the_bus_within_a_period(nao: RobotModel) -> None:
+    """The motors then hold where they are while they are let down, and are off at the end."""
+    with rig(nao, settings=replace(QUICK, ramp=0.4), compensation=False) as it:
+        guard = GuardedDriver(it.driver, CommandGate(nao))
+        guard.connect()
+        it.driver.write(command(nao, nao.postures["Crouch"]))
+        time.sleep(0.05)
+        began = time.time()
+        guard.emergency_stop()
+        assert time.time() - began < 0.2
+        assert {motor.status for motor in it.stub.motors.values()} == {"stopped"}
+        held = positions(it)
+        guard.stop()
+        assert positions(it) == held
+        assert wait_for(lambda: {motor.status for motor in it.stub.motors.values()} == {"off"})
+        stops = [when for when, name, _ in it.frames() if name == "EmergencyStop"]
+        assert 0.0 <= stops[0] - began < it.driver.period
 
 
 def test_softening_is_immediate_and_stiffening_slow(nao: RobotModel) -> None:

@@ -44,6 +44,7 @@ class FakeRobot:
         self.fell, self.alarms, self.time = False, (), 0.0
         self.alarms: tuple[str, ...]
         self.breaks: set[str] = set()
+        self.slow = 0.0
 
     def connect(self) -> None:
         self._do("connect")
@@ -62,7 +63,11 @@ class FakeRobot:
     def soften(self, share: float) -> None:
         self._do(("soften", share))
 
+    def emergency_stop(self) -> None:
+        self._do("emergency stop")
+
     def stop(self) -> None:
+        time.sleep(self.slow)
         self._do("stop")
 
     def _do(self, what: object) -> None:
@@ -145,12 +150,15 @@ def test_nothing_passes_before_connect_or_after_the_end() -> None:
         assert guard.status.refused == {NOT_LIVE: 1}
 
 
-def test_an_emergency_stop_softens_then_stops_once_and_stays_until_reset() -> None:
+def test_an_emergency_stop_ends_the_motion_then_softens_then_lets_go_once_and_stays_until_reset() -> None:
+    """Pressed again, the driver's own stop is repeated: a motor may have missed it."""
     guard, robot = guarded()
-    for _ in range(3):
+    guard.emergency_stop()
+    for _ in range(2):
         guard.emergency_stop()
     guard.stop()
-    assert robot.done == ["connect", ("soften", GuardSettings().emergency_stiffness), "stop"]
+    softened = ("soften", GuardSettings().emergency_stiffness)
+    assert robot.done == ["connect", "emergency stop", softened, "stop", "emergency stop", "emergency stop"]
     assert guard.status.condition is Condition.EMERGENCY
     with pytest.raises(DriverError, match="reset"):
         guard.connect()
@@ -161,7 +169,27 @@ def test_an_emergency_stop_softens_then_stops_once_and_stays_until_reset() -> No
     assert guard.command is not None
 
 
-@pytest.mark.parametrize("breaks", [{"soften"}, {"stop"}, {"soften", "stop"}])
+def test_an_emergency_stop_does_not_wait_for_a_robot_that_takes_its_time_to_let_go() -> None:
+    guard, robot = guarded()
+    robot.slow = 0.4
+    begin = time.monotonic()
+    guard.emergency_stop()
+    assert time.monotonic() - begin < 0.2
+    assert robot.done[-1] == ("soften", GuardSettings().emergency_stiffness)
+    guard.stop()
+    assert robot.done[-1] == "stop", "but a stop does"
+    guard, robot = guarded()
+    robot.slow = 0.2
+    guard.emergency_stop()
+    guard.reset()
+    guard.connect()
+    assert robot.done[-2:] == ["stop", "connect"], "and so does the next connection"
+
+
+BREAKS: list[set[str]] = [{"soften"}, {"stop"}, {"emergency stop"}, {"soften", "stop", "emergency stop"}]
+
+
+@pytest.mark.parametrize("breaks", BREAKS)
 def test_an_emergency_stop_ends_defined_whatever_the_driver_does(breaks: set[str]) -> None:
     guard, robot = guarded()
     robot.breaks = breaks
@@ -199,6 +227,7 @@ def test_an_emergency_stop_from_many_threads_during_writes_is_one() -> None:
     running = False
     writer.join(2.0)
     assert robot.done.count("stop") == 1
+    assert robot.done.index("emergency stop") < robot.done.index("stop")
     assert len([d for d in robot.done if isinstance(d, RobotCommand)]) <= done + 1, "but for one on its way"
     assert guard.status.condition is Condition.EMERGENCY
 
@@ -306,6 +335,21 @@ def test_a_robot_that_cannot_be_watched_is_let_go_of() -> None:
     assert robot.done == ["connect", "stop"]
     assert guard.status.condition is Condition.STOPPED
     assert guard.status.problem == "the robot does not answer"
+
+
+def test_after_an_emergency_stop_the_simulated_robot_holds_its_pose() -> None:
+    robot = MujocoDriver(NAO, real_time=False)
+    guard = GuardedDriver(robot, GATE)
+    guard.connect()
+    guard.write(command(0.0))
+    guard.emergency_stop()
+    robot.write(command(0.02, head=1.0))
+    held = robot.advance(1.0)
+    np.testing.assert_allclose(held.q, STAND, atol=0.02)
+    assert not held.fell
+    robot.connect()
+    robot.write(command(0.02, head=0.5))
+    assert robot.advance(1.0).q[NAO.joint("HeadYaw")] == pytest.approx(0.5, abs=0.02)
 
 
 def test_a_fall_in_the_simulation_is_seen_before_the_robot_lies() -> None:

@@ -352,6 +352,32 @@ def test_an_emergency_stop_while_the_robot_wakes_up_puts_it_to_rest(fake: Remote
     threading.Timer(1.0, guard.emergency_stop).start()
     with pytest.raises(DriverError):
         guard.connect()
+    assert ("goToPosture", "StandInit") not in fake.done
+    guard.stop()
+    assert fake.done[-1] == ("rest",)
+    assert guard.status.condition is Condition.EMERGENCY
+
+
+def test_an_emergency_stop_ends_the_motion_at_once_and_then_puts_the_robot_to_rest(fake: RemoteNao) -> None:
+    """Neither waits for the robot, which takes its time to rest."""
+    driver = NaoqiDriver(NAO, NaoqiSettings(url=fake.order("serve")))
+    guard = GuardedDriver(driver, CommandGate(NAO))
+    guard.connect()
+    guard.write(command(STAND))
+    guard.write(command(turned(0.05), 0.05))
+    fake.order("event", "resting", False)
+    began, before = time.monotonic(), len(fake.done)
+    guard.emergency_stop()
+    assert time.monotonic() - began < 0.2
+    wait_for(lambda: len(fake.done) >= before + 2)
+    assert fake.done[before : before + 2] == [("killAll",), ("setStiffnesses", pytest.approx(0.6))]
+    sent = len(fake.sent)
+    guard.write(command(turned(0.1), 0.1))
+    driver.write(command(turned(0.1), 0.1))
+    time.sleep(0.1)
+    assert len(fake.sent) == sent
+    fake.order("event", "resting", True)
+    guard.stop()
     assert fake.done[-1] == ("rest",)
     assert guard.status.condition is Condition.EMERGENCY
 
