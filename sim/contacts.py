@@ -1,7 +1,8 @@
 """What touches what: the soles stand on points of their true outline, body shapes meet the floor and each other.
 
-Collision groups: the floor (contype 1) meets all that has conaffinity 1, the sole points and the body shapes; the
-shapes of the feet leave the floor to the sole points. Among the shapes only ``RobotModel.pairs`` can touch.
+Among the body's shapes only ``RobotModel.pairs`` can touch. The floor meets all that has the bit ``FLOOR`` in its
+conaffinity, the sole points and the shapes; those of the feet leave the floor to the sole points. Free objects of a
+scene (with MuJoCo's usual contype and conaffinity, 1) meet each other and the bit ``OBJECTS``: floor, shapes, fingers.
 """
 
 from __future__ import annotations
@@ -24,8 +25,11 @@ OUTLINE_TOLERANCE = 0.001
 CONTACT_SOLREF = (0.005, 1.0)
 """Time constant (s) and damping ratio of contacts: a standing robot sinks in by less than 0.1 mm."""
 
-SHAPE_GROUP, SOLE_GROUP = 0, 3
-"""MuJoCo's geom groups: shapes are drawn, sole balls not."""
+SHAPE_GROUP, HIDDEN_GROUP = 0, 3
+"""MuJoCo's geom groups: shapes are drawn; sole balls, and fists in whose place fingers are drawn, not."""
+
+OBJECTS, FLOOR = 1, 2
+"""Bits of MuJoCo's contype and conaffinity: free objects of a scene, and the floor."""
 
 
 def add_shapes(spec: mujoco.MjSpec, bodies: dict[int, Any], robot: RobotModel, friction: float) -> None:
@@ -33,7 +37,7 @@ def add_shapes(spec: mujoco.MjSpec, bodies: dict[int, Any], robot: RobotModel, f
     feet = {robot.points[f"{side}_sole"].joint for side in SIDES}
     for shape in robot.shapes:
         geom = bodies[shape.joint].add_geom(name=shape.name, group=SHAPE_GROUP, **_geometry(shape))
-        geom.contype, geom.conaffinity = 0, 0 if shape.joint in feet else 1
+        geom.contype, geom.conaffinity = 0, OBJECTS if shape.joint in feet else OBJECTS | FLOOR
         geom.friction[0] = friction
         geom.solref = CONTACT_SOLREF
         geom.mass = 0.0  # masses come from the URDF
@@ -68,9 +72,9 @@ def add_soles(bodies: dict[int, Any], robot: RobotModel, friction: float) -> Non
                 type=mujoco.mjtGeom.mjGEOM_SPHERE,
                 pos=[*corner, SOLE_BALL],
                 size=[SOLE_BALL, 0.0, 0.0],
-                group=SOLE_GROUP,
+                group=HIDDEN_GROUP,
             )
-            ball.contype, ball.conaffinity, ball.mass = 0, 1, 0.0
+            ball.contype, ball.conaffinity, ball.mass = 0, FLOOR, 0.0
             ball.friction[0] = friction
             ball.solref = CONTACT_SOLREF
 

@@ -6,11 +6,15 @@ import threading
 import time
 from typing import NamedTuple
 
+import mujoco
+import numpy as np
+
 from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import RobotState
 from naoimitate.robot.model import RobotModel
+from naoimitate.sim.model import Scene
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.placement import stand_on_floor
 from naoimitate.sim.sensors import roll_pitch
@@ -26,13 +30,15 @@ class _Target(NamedTuple):
     base_pos: Array
     base_quat: Array
     support: str
+    hand_opening: Array | None = None
 
 
 class MujocoDriver:
     """A robot in MuJoCo that stands in its posture ``stand`` until the first command.
 
     real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
-    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity.
+    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity. scene: adds
+    objects to the robot's world. The hands are closed until a command opens them.
     """
 
     def __init__(
@@ -42,9 +48,10 @@ class MujocoDriver:
         *,
         compensation: bool = True,
         real_time: bool = True,
+        scene: Scene | None = None,
     ) -> None:
         self._settings = settings
-        self._physics = Physics(robot, settings)
+        self._physics = Physics(robot, settings, scene)
         self._compensation = GravityCompensation(robot) if compensation else None
         self._real_time = real_time
         stand = robot.postures["stand"]
@@ -57,6 +64,22 @@ class MujocoDriver:
     def period(self) -> float:
         """Time between two uses of the newest command, s."""
         return self._settings.period
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """The simulated world; to look at."""
+        return self._physics.model
+
+    @property
+    def snapshot(self) -> tuple[float, Array]:
+        """Simulated time (s) and all positions of the world (``qpos`` of the model: robot, fingers, objects) after the
+        last period; may be asked for in any thread and costs nothing."""
+        return self._snapshot
+
+    @property
+    def hand_opening(self) -> Array:
+        """How far the hands are open, (2,), measured after the last period; NaN for a robot without fingers."""
+        return self._opening
 
     def connect(self) -> None:
         """Put the robot into its stand; with ``real_time`` its clock starts."""
@@ -74,7 +97,17 @@ class MujocoDriver:
     def write(self, command: RobotCommand) -> None:
         """Replace the command that the servos follow from the next period on."""
         if not self._held:
-            self._target = _Target(command.q, command.base_pos, command.base_quat, command.support)
+            self._target = _Target(
+                command.q, command.base_pos, command.base_quat, command.support, self._kept(command.hand_opening)
+            )
+
+    def _kept(self, opening: Array | None) -> Array | None:
+        """Openings (2,) with the last known ones in place of NaN: a command that is replaced before the next period
+        has still been heard."""
+        last = self._target.hand_opening
+        if opening is None or last is None:
+            return last if opening is None else opening
+        return np.where(np.isnan(opening), last, opening)
 
     def soften(self, share: float) -> None:
         """Turn the servos' stiffness down to a share, 0 to 1, from the next period on."""
@@ -102,7 +135,7 @@ class MujocoDriver:
         self._target = target
         self._physics.soften(1.0)
         self._physics.place(target.q, target.base_pos, target.base_quat)
-        self._state = self._measure(target)
+        self._observe(target)
 
     def _run(self) -> None:
         due = time.monotonic()
@@ -116,7 +149,13 @@ class MujocoDriver:
         servos = target.q
         if self._compensation is not None:
             servos = self._compensation.command(target.q, target.base_quat, target.support, self._settings.stiffness)
-        self._physics.advance(servos, self.period)
+        self._physics.advance(servos, self.period, target.hand_opening)
+        self._observe(target)
+
+    def _observe(self, target: _Target) -> None:
+        """Take what other threads may ask for; each is one value that is replaced as a whole."""
+        self._snapshot = self._physics.time, np.array(self._physics.data.qpos)
+        self._opening = self._physics.opening
         self._state = self._measure(target)
 
     def _measure(self, target: _Target) -> RobotState:

@@ -3,11 +3,12 @@
 Names: bodies and joints as in the URDF, actuators as the joints that they move, ``base`` the free joint, ``floor``,
 geoms of body shapes as in ``RobotModel.shapes``, ``l_plate``, ``r_plate`` bodies in the sole frames, ``l_sole_0``...
 the contact points of a sole, sensors ``accelerometer``, ``gyro`` and ``l_fsr_front_left``... after
-``hw.driver.FSR_NAMES``.
+``hw.driver.FSR_NAMES``; those of the fingers see ``sim.fingers``.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -17,24 +18,29 @@ from naoimitate.core.errors import RobotModelError
 from naoimitate.core.frames import Array
 from naoimitate.robot.model import BASE, RobotModel
 from naoimitate.sim.contacts import add_shapes, add_soles
+from naoimitate.sim.coupling import STOP_SOLREF, couple_joints
+from naoimitate.sim.fingers import add_fingers
 from naoimitate.sim.scene import add_looks, add_scene
 from naoimitate.sim.sensors import add_cameras, add_force_sensors, add_imu
 from naoimitate.sim.settings import SimSettings
 
 DEFAULT = SimSettings()
 
-STOP_SOLREF = (0.005, 1.0)
-"""Time constant (s) and damping ratio of joint stops and of the coupling of joints that share a motor: gears, rigid
-next to the servos."""
+Scene = Callable[[mujoco.MjSpec], None]
+"""Adds the objects of a scene to the robot on its floor. Free objects meet floor, body and fingers with MuJoCo's own
+``contype`` and ``conaffinity``."""
 
 
-def build_model(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjModel:
-    """Compile the robot on its floor; see ``build_spec``."""
-    return build_spec(robot, settings).compile()
+def build_model(robot: RobotModel, settings: SimSettings = DEFAULT, scene: Scene | None = None) -> mujoco.MjModel:
+    """Compile the robot on its floor, with the objects of a scene; see ``build_spec``."""
+    spec = build_spec(robot, settings)
+    if scene is not None:
+        scene(spec)
+    return spec.compile()
 
 
 def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjSpec:
-    """Return an editable model (for other scenes): free torso, servos, soles, body shapes, sensors, cameras, floor.
+    """Return an editable model (for other scenes): free torso, servos, soles, shapes, fingers, sensors, floor.
 
     Raises RobotModelError when the URDF and the robot's data do not belong together.
     """
@@ -53,6 +59,7 @@ def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjS
     add_cameras(spec, robot)
     add_looks(spec, bodies, robot)
     add_scene(spec, bodies[BASE], settings.friction)
+    add_fingers(spec, robot)
     return spec
 
 
@@ -110,12 +117,5 @@ def _add_servos(spec: mujoco.MjSpec, robot: RobotModel, settings: SimSettings) -
 
 
 def _couple(spec: mujoco.MjSpec, robot: RobotModel) -> None:
-    """One motor, two joints: follower = leader."""
     for leader, follower in robot.coupled:
-        names = robot.joint_names[follower], robot.joint_names[leader]
-        coupling = spec.add_equality(
-            name=f"{names[0]}_as_{names[1]}", type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT
-        )
-        coupling.name1, coupling.name2 = names
-        coupling.data[:5] = [0.0, 1.0, 0.0, 0.0, 0.0]
-        coupling.solref = STOP_SOLREF
+        couple_joints(spec, robot.joint_names[follower], robot.joint_names[leader])

@@ -9,7 +9,8 @@ from naoimitate.core.frames import SIDES, Array
 from naoimitate.hw.driver import FSR_NAMES
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.contacts import plate_name
-from naoimitate.sim.model import build_model
+from naoimitate.sim.hands import CLOSED, Hands
+from naoimitate.sim.model import Scene, build_model
 from naoimitate.sim.settings import SimSettings
 
 NORMAL = 0
@@ -17,10 +18,13 @@ NORMAL = 0
 
 
 class Physics:
-    """One simulated robot on its floor. J joints in the order of the ``RobotModel``; the world's floor is z = 0."""
+    """One simulated robot on its floor. J joints in the order of the ``RobotModel``; the world's floor is z = 0.
 
-    def __init__(self, robot: RobotModel, settings: SimSettings) -> None:
-        self.model = build_model(robot, settings)
+    scene: adds objects to the model; ``place`` puts them back where they began.
+    """
+
+    def __init__(self, robot: RobotModel, settings: SimSettings, scene: Scene | None = None) -> None:
+        self.model = build_model(robot, settings, scene)
         self.data = mujoco.MjData(self.model)
         self._settings = settings
         joints = [self.model.joint(name) for name in robot.joint_names]
@@ -28,6 +32,8 @@ class Physics:
         followers = {follower for _, follower in robot.coupled}
         self._driven = np.array([index for index in range(len(joints)) if index not in followers])
         self._servos = np.array([self.model.actuator(robot.joint_names[index]).id for index in self._driven])
+        self._hands = Hands(self.model, robot)
+        self._all_servos = np.concatenate([self._servos, self._hands.servos])
         self._fsr = np.array([[self._sensor(f"{side}_fsr_{name}") for name in FSR_NAMES] for side in SIDES])
         self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
         self._plates = np.array([self.model.body(plate_name(side)).id for side in SIDES])
@@ -41,15 +47,20 @@ class Physics:
 
     @property
     def weight(self) -> float:
-        """N."""
-        return float(self.model.body_mass.sum() * -self.model.opt.gravity[2])
+        """N, of the robot."""
+        mass = self.model.body_subtreemass[self.model.jnt_bodyid[self.model.joint("base").id]]
+        return float(mass * -self.model.opt.gravity[2])
 
-    def place(self, q: Array, base_pos: Array, base_quat: Array) -> None:
-        """Put the robot at rest into a posture, servos commanded to stay there; q (J,) rad, pos (3,) m, quat (4,)."""
+    def place(self, q: Array, base_pos: Array, base_quat: Array, opening: Array = CLOSED) -> None:
+        """Put the robot at rest into a posture, servos commanded to stay there; q (J,) rad, pos (3,) m, quat (4,).
+
+        opening: (2,) of the hands, 0 closed to 1 open; closed where it is NaN.
+        """
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:3], self.data.qpos[3:7] = base_pos, base_quat
         self.data.qpos[self._qpos] = q
         self.data.ctrl[self._servos] = q[self._driven]
+        self._hands.place(self.data, opening)
         mujoco.mj_forward(self.model, self.data)
 
     def soften(self, share: float) -> None:
@@ -57,13 +68,18 @@ class Physics:
         self.model.actuator_gainprm[:] = share * self._gain
         self.model.actuator_biasprm[:] = share * self._bias
 
-    def advance(self, command: Array, duration: float) -> None:
-        """Let ``duration`` (s) pass while the servo commands move in a straight line to ``command`` (J,) rad."""
+    def advance(self, command: Array, duration: float, opening: Array | None = None) -> None:
+        """Let ``duration`` (s) pass while the servo commands move in a straight line to ``command`` (J,) rad.
+
+        opening: (2,) of the hands, 0 closed to 1 open, which move to it at their own speed; NaN and None keep the last.
+        """
         steps = max(1, round(duration / self._settings.timestep))
-        start, end = self.data.ctrl[self._servos], command[self._driven]
+        self._hands.ask(opening)
+        hands = self._hands.command(self.data.ctrl[self._hands.servos], steps * self._settings.timestep)
+        start, end = self.data.ctrl[self._all_servos], np.concatenate([command[self._driven], hands])
         self.foot_load[:] = 0.0
         for step in range(1, steps + 1):
-            self.data.ctrl[self._servos] = start + (end - start) * (step / steps)
+            self.data.ctrl[self._all_servos] = start + (end - start) * (step / steps)
             mujoco.mj_step(self.model, self.data)
             self.foot_load += self.fsr.sum(axis=1) / steps
 
@@ -76,6 +92,11 @@ class Physics:
     def q(self) -> Array:
         """Joint angles (J,) rad."""
         return np.array(self.data.qpos[self._qpos])
+
+    @property
+    def opening(self) -> Array:
+        """How far the left and right hand are open, (2,), 0 closed to 1; NaN for a robot without fingers."""
+        return self._hands.opening(self.data)
 
     @property
     def torque(self) -> Array:

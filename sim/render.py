@@ -41,16 +41,19 @@ def render_video(
     fps: float = 30.0,
     human: Motion | None = None,
     human_time: Array | None = None,
+    hand_opening: Array | None = None,
     view: View | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Path:
     """Write an mp4 of a run: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), as planned or as simulated.
 
     human: the person, as tall as the robot and at its right; human_time: (T,) s in their motion, default: since the
-    first frame; progress: told the share that is done. Raises RenderingUnavailable without OpenGL or an encoder.
+    first frame; hand_opening: (T, 2), 0 closed to 1 open, NaN as before, default closed; progress: told the share that
+    is done. Raises RenderingUnavailable without OpenGL or an encoder.
     """
     frames = np.searchsorted(time, np.arange(time[0], time[-1] + 1e-9, 1.0 / fps), side="right") - 1
     path = Path(path)
+    hands = _openings(hand_opening, len(time))
     with Stage(robot, *VIDEO_SIZE, smooth=False) as stage:
         people = _people(stage, human, human_time, time, base_pos)
         centre = _camera_path(base_pos, time)
@@ -60,7 +63,7 @@ def render_video(
             for number, frame in enumerate(frames):
                 pose = q[frame], base_pos[frame], base_quat[frame]
                 person = None if people is None else people[frame]
-                video.append_data(stage.draw(pose, centre[frame], view or View(), person))
+                video.append_data(stage.draw(pose, centre[frame], view or View(), person, opening=hands[frame]))
                 if progress is not None:
                     progress((number + 1) / len(frames))
     return path
@@ -78,6 +81,7 @@ def render_strip(
     at: Sequence[float] | None = None,
     human: Motion | None = None,
     human_time: Array | None = None,
+    hand_opening: Array | None = None,
     view: View | None = None,
 ) -> Path:
     """Write a PNG: the robot at equal steps of time, the person at the same moments in a row above.
@@ -87,6 +91,7 @@ def render_strip(
     moments = np.linspace(time[0], time[-1], count) if at is None else np.asarray(at, dtype=float)
     frames = np.clip(np.searchsorted(time, moments, side="right") - 1, 0, len(time) - 1)
     path = Path(path)
+    hands = _openings(hand_opening, len(time))
     with Stage(robot, *PANEL_SIZE) as stage:
         people = _people(stage, human, human_time, time, base_pos, gap=0.0)
         view = view or View(distance=2.7)
@@ -95,7 +100,7 @@ def render_strip(
             pose, centre = (q[frame], base_pos[frame], base_quat[frame]), base_pos[frame, :2]
             if people is not None:
                 rows[0].append(stage.draw(pose, centre, view, people[frame], robot=False))
-            rows[1].append(stage.draw(pose, centre, view))
+            rows[1].append(stage.draw(pose, centre, view, opening=hands[frame]))
     strip = np.concatenate([np.concatenate(row, axis=1) for row in rows if row], axis=0)
     _label(strip, [f"{moment:.1f} s" for moment in moments]).save(path)
     return path
@@ -131,6 +136,15 @@ def _people(
 def _camera_path(base_pos: Array, time: Array) -> Array:
     """Places on the floor (T, 2) m that the camera looks at: the robot's, without its sway."""
     return slow_part(base_pos[:, :2], time, CAMERA_TIME)
+
+
+def _openings(hand_opening: Array | None, frames: int) -> Array:
+    """Openings (T, 2) without NaN: the last known ones, at first closed."""
+    if hand_opening is None:
+        return np.zeros((frames, 2))
+    known = np.where(np.isfinite(hand_opening), np.arange(frames)[:, None], -1)
+    last = np.maximum.accumulate(known)
+    return np.asarray(np.where(last < 0, 0.0, np.take_along_axis(hand_opening, np.maximum(last, 0), axis=0)))
 
 
 def _label(strip: Image, labels: Sequence[str]) -> Pillow.Image:

@@ -12,6 +12,7 @@ import numpy as np
 
 from naoimitate.core.frames import SIDES
 from naoimitate.robot.model import BASE, RobotModel
+from naoimitate.sim.contacts import FLOOR, OBJECTS
 
 SHELL, JOINT, LENS = "shell", "joint", "lens"
 SIDE_COLOUR = {"l": "left", "r": "right"}
@@ -41,7 +42,7 @@ def add_scene(spec: mujoco.MjSpec, torso: Any, friction: float) -> None:
     _add_textures(spec)
     floor = spec.worldbody.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05])
     floor.material, floor.group = "floor", FLOOR_GROUP
-    floor.contype, floor.conaffinity = 1, 0
+    floor.contype, floor.conaffinity = FLOOR, OBJECTS
     floor.friction[0] = friction
     for position, direction, strength, shadow in (
         ([0.3, 0.6, 2.0], [-0.15, -0.3, -1.0], 0.55, True),

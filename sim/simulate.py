@@ -31,6 +31,7 @@ class SimResult:
     load: (T, 2) N on the left and right sole, mean since the frame before. swing_load: (T,) share of the weight on the
     foot planned in the air. cop_margin: (T,) m from the centre of pressure to the edge of the planned stance soles
     where they really are, negative outside, NaN while the soles carry nothing.
+    hand_opening: (T, 2) left and right, 0 closed to 1 open, NaN for a robot without fingers.
     fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``falling.has_fallen``).
     """
 
@@ -43,6 +44,7 @@ class SimResult:
     load: Array
     swing_load: Array
     cop_margin: Array
+    hand_opening: Array
     fell: npt.NDArray[np.bool_]
 
     @property
@@ -59,6 +61,7 @@ def simulate(
     base_quat: Array,
     support: npt.NDArray[np.str_],
     *,
+    hand_opening: Array | None = None,
     stiffness: float = DEFAULT.stiffness,
     compensation: bool = True,
     settings: SimSettings = DEFAULT,
@@ -66,6 +69,7 @@ def simulate(
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
 
+    hand_opening: (T, 2) of the hands, as in the run file; NaN keeps the last, without one they stay closed.
     stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's gravity compensation.
     progress: told the share that is done. Each frame's command is under way from the time of the frame before, and is
     due at its own.
@@ -77,25 +81,25 @@ def simulate(
         commands = np.array(
             [gravity.command(*frame, stiffness) for frame in zip(q, base_quat, support, strict=True)]
         )  # fmt: skip
-    physics.place(q[0], base_pos[0], base_quat[0])
+    openings = np.full((len(time), 2), np.nan) if hand_opening is None else hand_opening
+    physics.place(q[0], base_pos[0], base_quat[0], openings[0])
     samples = []
-    for command, due, mode in zip(commands, time - time[0] + SETTLE_TIME, support, strict=True):
-        physics.advance(command, float(due) - physics.time)
+    for command, due, mode, opening in zip(commands, time - time[0] + SETTLE_TIME, support, openings, strict=True):
+        physics.advance(command, float(due) - physics.time, opening)
         samples.append(_sample(robot, physics, str(mode)))
         if progress is not None:
             progress(len(samples) / len(time))
-    sim_q, sim_pos, sim_quat, load, margin = (np.array(column) for column in zip(*samples, strict=True))
+    sim_q, sim_pos, sim_quat, load, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
     lean, height = tilt(base_quat, sim_quat), sim_pos[:, 2] / base_pos[:, 2]
     swing = swing_load(support, load, physics.weight)
-    return SimResult(
-        time, sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, has_fallen(lean, height, swing)
-    )  # fmt: skip
+    fell = has_fallen(lean, height, swing)
+    return SimResult(time, sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
 
 
-def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float]:
-    """Joints, torso position and orientation, foot loads, margin of the centre of pressure: see ``SimResult``."""
+def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float, Array]:
+    """Joints, torso (position, orientation), foot loads, margin of the centre of pressure, hands: see ``SimResult``."""
     margin = _cop_margin(robot, physics, support)
-    return physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin
+    return physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin, physics.opening
 
 
 def _cop_margin(robot: RobotModel, physics: Physics, support: str) -> float:

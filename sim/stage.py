@@ -10,6 +10,7 @@ from naoimitate.core.frames import Array
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.contacts import SHAPE_GROUP
 from naoimitate.sim.gl import Canvas, Image
+from naoimitate.sim.hands import CLOSED
 from naoimitate.sim.person import draw_person
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.placement import stand_on_floor
@@ -61,12 +62,14 @@ class Stage:
         person: Array | None = None,
         *,
         robot: bool = True,
+        opening: Array = CLOSED,
     ) -> Image:
         """Picture (H, W, 3): the robot at pose q (J,) rad, torso (3,) m and (4,), unless ``robot`` is False.
 
-        centre: (2,) m, the place on the floor that the camera looks at; person: landmarks (19, 3) m as staged.
+        opening: (2,) of its hands, 0 closed to 1 open. centre: (2,) m, the place on the floor that the camera looks at;
+        person: landmarks (19, 3) m as staged.
         """
-        self._physics.place(*pose)
+        self._physics.place(*pose, opening)
         camera = self._camera
         camera.lookat[:] = [*centre, view.height * self.robot_height]
         camera.distance = view.distance * self.robot_height

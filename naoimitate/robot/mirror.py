@@ -55,6 +55,21 @@ class Mirror:
         x, y, z = value.get("at", (0.0, 0.0, 0.0))
         return {"link": self.name(value["link"]), "at": [x, -y, z]}
 
+    def fingers(self, hand: Mapping[str, Any]) -> dict[str, Any]:
+        """The shape of a hand: the same on the other side; a hinge's axis turns as a joint's (see above)."""
+
+        def bone(value: Mapping[str, Any]) -> dict[str, Any]:
+            moved = {"points": [[x, -y, z] for x, y, z in value["points"]]}
+            if "axis" in value:
+                x, y, z = value["axis"]
+                moved["axis"] = [-x, y, -z]
+            return {**value, **moved}
+
+        x, y, z = hand["grip"]
+        names = {key: self.name(hand[key]) for key in ("link", "fist")}
+        digits = {name: bone(digit) for name, digit in hand["digits"].items()}
+        return {**hand, **names, "grip": [x, -y, z], "palm": [bone(part) for part in hand["palm"]], "digits": digits}
+
     def table(self, table: Mapping[str, Any]) -> dict[str, Any]:
         """A coupling table (x, y, rows of x, y_min, y_max) for the twins of its joints."""
         x, y = table["x"], table["y"]
@@ -79,6 +94,8 @@ def both_sides(data: Mapping[str, Any], mirror: Mirror) -> dict[str, Any]:
     written = [(table["x"], table["y"]) for table in tables]
     twins = [mirror.table(table) for table in tables]
     full["tables"] = tables + [twin for twin in twins if (twin["x"], twin["y"]) not in written]
+    if "fingers" in data:
+        full["fingers"] = _sided(data["fingers"], mirror.fingers)
     groups = [list(group) for group in data.get("collision", {}).get("exclude", [])]
     full["collision"] = {"exclude": groups + [twin for g in groups if (twin := mirror.names(g)) not in groups]}
     return full
