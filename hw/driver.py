@@ -29,7 +29,8 @@ class RobotState:
     fsr: (2, 4) N, force sensors of the left and right foot, columns as ``FSR_NAMES``.
     fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height.
     base_pos: (3,) m and base_quat: (4,) torso in the world, where the driver knows them (simulation), else None.
-    alarms: what the robot complains about, a short sentence each: torque, temperature, battery, a silent node.
+    alarms: what the robot complains about while it still obeys, a short sentence each: a warm motor, a low battery, a
+    damaged frame. faults: why it cannot be commanded any more, likewise: a motor that is off, silent or blocked.
     What a robot does not measure is NaN.
     """
 
@@ -44,6 +45,7 @@ class RobotState:
     base_pos: Array | None = None
     base_quat: Array | None = None
     alarms: tuple[str, ...] = ()
+    faults: tuple[str, ...] = ()
 
 
 @runtime_checkable

@@ -6,6 +6,7 @@ clock is real time; the gate and the latch behind it are pure.
 
 from __future__ import annotations
 
+import contextlib
 import enum
 import math
 import threading
@@ -20,6 +21,7 @@ from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.fsm.fall_latch import Action, FallLatch, FallLimits
 from naoimitate.hw.driver import Driver, RobotState
 from naoimitate.hw.lean import UPRIGHT, lean
+from naoimitate.hw.spell import Spell
 
 GRACE = 0.05
 """[s] that an emergency stop waits for the driver to let go of the robot; what takes longer goes on by itself."""
@@ -35,6 +37,12 @@ class Condition(enum.Enum):
     CONNECTING = "connecting"
     LIVE = "live"
     """Commands pass."""
+    FAULT = "fault: it holds its pose"
+    """The robot does not obey as it should: no command passes, and the last one stays in force, until ``stop``.
+
+    Nothing is softened: that command is a balanced pose, and a robot that has lost one motor of a leg stands in it as
+    long as all others stay stiff, while a limp one falls for sure. Whether the robot can be let go of, a person sees
+    best: take hold of it, then stop. Should it fall after all, the fall latch softens it as ever."""
     FALLING = "falling"
     """Soft; no command passes."""
     FALLEN = "fallen"
@@ -43,6 +51,10 @@ class Condition(enum.Enum):
     """Let go of by ``emergency_stop``, until ``reset``."""
     STOPPED = "stopped"
     """Let go of in peace."""
+
+
+WATCHED = (Condition.LIVE, Condition.FAULT, Condition.FALLING)
+"""Conditions in which the robot may still fall."""
 
 
 @dataclass(frozen=True)
@@ -54,10 +66,9 @@ class GuardSettings:
     """Share of the servos' stiffness while the robot falls: soft joints give way, and gears survive."""
     emergency_stiffness: float = 0.6
     """The same in an emergency stop: people caught get loose, and a robot on both feet still stands."""
-    stop_on_alarm: bool = False
-    """Whether an alarm of the driver ends the motion; otherwise it is only shown."""
-    alarm_patience: float = 1.0
-    """[s] for which an alarm must last to end the motion."""
+    fault_patience: float = 0.3
+    """[s] for which a fault of the driver must last to end the motion: a motor that missed a few frames may come back.
+    Alarms are only shown."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +78,8 @@ class GuardStatus:
     condition: see ``Condition``. accepted: commands that reached the robot. refused: how many did not, by reason (one
     command may have several). refusing: why the newest command was refused; empty when it passed. held: s since a
     command passed. lean: rad of the torso away from its plan at the last reading, NaN where nobody
-    measures it. alarms: of the driver. problem: what a driver complained about when it was last used, or empty.
+    measures it. alarms: all that the robot complains about, its faults first. problem: what ended the motion, or what
+    a driver complained about when it was last used, or empty.
     """
 
     condition: Condition
@@ -99,12 +111,14 @@ class GuardedDriver:
         self._latch = FallLatch(self._settings.fall)
         self._ended = threading.Lock()
         self._letting_go: threading.Thread | None = None
-        self._condition, self._problem = Condition.OFF, ""
+        self._alive, self._problem = Condition.OFF, ""
+        self._over: Condition | None = None
         self._accepted, self._refused = 0, Counter[str]()
         self._refusing: tuple[str, ...] = ()
         self._alarms: tuple[str, ...] = ()
         self._command: RobotCommand | None = None
-        self._passed = self._checked = self._sensed = self._alarmed = 0.0
+        self._passed = self._checked = self._sensed = 0.0
+        self._faulty = Spell(0.0)
         self._lean = math.nan
 
     @property
@@ -116,6 +130,11 @@ class GuardedDriver:
     def command(self) -> RobotCommand | None:
         """The command in force: the last one that passed."""
         return self._command
+
+    @property
+    def _condition(self) -> Condition:
+        """How it ended, or what it is in: an end that comes in between is never written over."""
+        return self._over or self._alive
 
     @property
     def status(self) -> GuardStatus:
@@ -144,7 +163,7 @@ class GuardedDriver:
             self._wait_until_let_go()
             self._latch, self._ended = FallLatch(self._settings.fall), threading.Lock()
             self._command, self._problem, self._refusing = None, "", ()
-            self._condition = Condition.CONNECTING
+            self._alive, self._over = Condition.CONNECTING, None
             try:
                 self.__driver.connect()
                 self._begin(self.__driver.read())
@@ -155,13 +174,14 @@ class GuardedDriver:
                 self._wait_until_let_go()
                 self._try(self.__driver.stop)  # again: the driver may have gone on after the first
                 raise DriverError(f"{self._condition.value} while the robot was being connected")
-            self._condition = Condition.LIVE
+            self._alive = Condition.LIVE
 
     def _begin(self, state: RobotState) -> None:
         """Start gate and latch where the robot is."""
         self._gate_state = self._gate.begin(state.q)
-        self._sensed, self._alarmed = state.time, 0.0
+        self._sensed = state.time
         self._passed = self._checked = self._clock()
+        self._faulty = Spell(self._passed)
 
     def read(self) -> RobotState:
         """The robot's newest state, once the fall latch has seen it.
@@ -179,10 +199,11 @@ class GuardedDriver:
         return state
 
     def write(self, command: RobotCommand) -> None:
-        """Let a command pass, or hold the last one: ``status`` says which and why."""
+        """Let a command pass, or hold the last one: ``status`` says which and why. A driver that fails is let go of."""
         with self._lock:
-            if self._condition in (Condition.LIVE, Condition.FALLING):
-                self.read()
+            if self._condition in WATCHED:
+                with contextlib.suppress(NaoimitateError):  # it has ended the motion, and ``status`` says why
+                    self.read()
             if self._condition is not Condition.LIVE:
                 self._refuse((NOT_LIVE,))
                 return
@@ -195,11 +216,18 @@ class GuardedDriver:
             if self._condition is Condition.LIVE:  # an emergency stop may have come in between
                 self._command, self._passed, self._refusing = command, now, ()
                 self._accepted += 1
-                self.__driver.write(verdict.accepted)
+                self._hand_over(verdict.accepted)
+
+    def _hand_over(self, command: RobotCommand) -> None:
+        try:
+            self.__driver.write(command)
+        except NaoimitateError as error:
+            self._problem = str(error)
+            self._end(Condition.STOPPED)
 
     def soften(self, share: float) -> None:
-        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value; ignored unless live."""
-        if self._condition is Condition.LIVE:
+        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value; ignored unless it holds itself."""
+        if self._condition in (Condition.LIVE, Condition.FAULT):
             self.__driver.soften(min(max(share, 0.0), 1.0))
 
     def stop(self) -> None:
@@ -224,37 +252,39 @@ class GuardedDriver:
                 raise DriverError("the robot is falling: wait until it lies, put it on its feet, then reset")
             self._latch.reset()
             if self._condition in (Condition.FALLEN, Condition.EMERGENCY):
-                self._condition = Condition.STOPPED
+                self._over = Condition.STOPPED
 
     def _refuse(self, reasons: tuple[str, ...]) -> None:
         self._refusing = reasons
         self._refused.update(reasons)
 
     def _watch(self, state: RobotState) -> None:
-        """Fall latch and alarms, once per new reading."""
-        dt = state.time - self._sensed
-        if self._condition not in (Condition.LIVE, Condition.FALLING) or dt <= 0.0:
+        """Alarms and faults, and the fall latch once per new reading."""
+        if self._condition not in WATCHED:
             return
-        self._sensed, self._alarms = state.time, state.alarms
+        self._alarms = (*state.faults, *state.alarms)
+        lasted = self._faulty.look(bool(state.faults), self._clock())
+        if self._condition is Condition.LIVE and lasted >= self._settings.fault_patience:
+            self._alive, self._problem = Condition.FAULT, "; ".join(state.faults)
+        dt = state.time - self._sensed
+        if dt <= 0.0:
+            return
+        self._sensed = state.time
         self._lean = lean(UPRIGHT if self._command is None else self._command.base_quat, state.angles)
         action = self._latch.sense(self._lean, _turning(state.gyro), state.fell, dt)
         if action is Action.SOFTEN:
-            self._condition = Condition.FALLING
+            self._alive = Condition.FALLING
             self._try(lambda: self.__driver.soften(self._settings.fall_stiffness))
         elif action is Action.STOP:
             self._end(Condition.FALLEN)
-        self._alarmed = self._alarmed + dt if state.alarms else 0.0
-        if self._settings.stop_on_alarm and self._alarmed >= self._settings.alarm_patience:
-            self._problem = self._problem or "; ".join(state.alarms)
-            self._end(Condition.STOPPED)
 
     def _end(self, condition: Condition, stiffness: float | None = None) -> None:
         """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does."""
-        if self._condition is Condition.OFF or not self._ended.acquire(blocking=False):
-            self._condition = condition if condition is Condition.EMERGENCY else self._condition
+        if self._alive is Condition.OFF or not self._ended.acquire(blocking=False):
+            self._over = condition if condition is Condition.EMERGENCY else self._over
             return
-        fell = self._condition is Condition.FALLING
-        self._condition = Condition.FALLEN if fell and condition is not Condition.EMERGENCY else condition
+        fell = self._alive is Condition.FALLING
+        self._over = Condition.FALLEN if fell and condition is not Condition.EMERGENCY else condition
         if stiffness is not None and not fell:
             self._try(lambda: self.__driver.soften(stiffness))
         if condition is not Condition.EMERGENCY:

@@ -51,6 +51,9 @@ HAND_STEP, HAND_FRACTION = 0.05, 0.5
 SILENCE = 0.5
 """[s] without an answer after which the robot is said not to answer; ten times its slowest call on a busy network."""
 
+GONE = 2.0
+"""[s] without an answer after which it does not obey either; it then holds the last command that it got."""
+
 
 @dataclass(frozen=True)
 class NaoqiSettings:
@@ -134,7 +137,7 @@ class NaoqiDriver:
         self._thread.start()
 
     def read(self) -> RobotState:
-        """The newest state that the robot has sent, with an alarm where it has not for a while.
+        """The newest state that the robot has sent, with an alarm where it has not for a while, and later a fault.
 
         Raises DriverError when the connection has broken.
         """
@@ -146,6 +149,8 @@ class NaoqiDriver:
         silent = self._now() - newest.time
         if silent < SILENCE:
             return newest
+        if silent >= GONE:
+            return replace(newest, faults=(*newest.faults, f"the robot has not answered for {GONE:g} s"))
         return replace(newest, alarms=(*newest.alarms, f"the robot has not answered for {silent:.1f} s"))
 
     def write(self, command: RobotCommand) -> None:

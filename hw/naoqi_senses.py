@@ -25,11 +25,15 @@ FSR = tuple(
 )
 BATTERY = "Battery/Charge"
 
-HOT = {1: "is hot: less stiffness", 2: "is very hot: much less stiffness", 3: "is too hot: no stiffness"}
+HOT = {1: "is hot: less stiffness", 2: "is very hot: much less stiffness"}
 """A joint's temperature status beyond 0; the robot lowers the stiffness itself."""
+LIMP = 3
+"""The status of a joint that the robot has switched off because of its heat."""
 
 LOW_BATTERY = 0.15
 """Charge, 0 to 1, under which there is an alarm: 5 to 10 minutes of standing are left."""
+EMPTY_BATTERY = 0.05
+"""Charge under which it is a fault: the robot is about to switch itself off as it stands."""
 
 
 def keys(joint_names: Sequence[str]) -> list[str]:
@@ -53,9 +57,12 @@ def state(
     torso was told to be. Weights on the feet come in kg. NAOqi gives no torques.
     """
     numbers = np.array([_number(value) for value in values[:17]])
-    alarms = [f"{name} {HOT[s]}" for name, v in zip(joint_names, values[17:], strict=True) if (s := _status(v)) in HOT]
+    heat = [(name, _status(value)) for name, value in zip(joint_names, values[17:], strict=True)]
+    alarms = [f"{name} {HOT[status]}" for name, status in heat if status in HOT]
+    faults = [f"{name} is too hot and has no stiffness any more" for name, status in heat if status == LIMP]
     if numbers[16] < LOW_BATTERY:
-        alarms.append(f"battery at {100.0 * numbers[16]:.0f} %")
+        low = faults if numbers[16] < EMPTY_BATTERY else alarms
+        low.append(f"battery at {100.0 * numbers[16]:.0f} %")
     return RobotState(
         time=time,
         q=zeros.from_servos(np.array(servos, dtype=np.float64)),
@@ -66,6 +73,7 @@ def state(
         fsr=GRAVITY * numbers[8:16].reshape(2, 4),
         fell=lean(planned, numbers[0:2]) > TILT_LIMIT,
         alarms=tuple(alarms),
+        faults=tuple(faults),
     )
 
 

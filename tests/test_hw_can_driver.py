@@ -190,7 +190,7 @@ def test_the_emergency_stop_ends_every_motion_and_is_over_after_a_new_start(nao:
         it.driver.write(command(nao, nao.postures["zero"]))
         time.sleep(0.2)
         assert positions(it) == held
-        assert "motor 1 (HeadYaw) does not follow any more: stopped" in it.driver.read().alarms
+        assert "every motor has stopped following: stopped" in it.driver.read().faults
         it.driver.connect()
         assert {motor.status for motor in it.stub.motors.values()} == {"following"}
         assert it.driver.read().alarms == ()

@@ -20,18 +20,24 @@ def alarm(it: Rig, sentence: str, patience: float = 2.0) -> bool:
     return wait_for(lambda: sentence in it.driver.read().alarms, patience)
 
 
-def test_a_silent_motor_is_an_alarm_within_its_watchdog_and_the_others_go_on(nao: RobotModel) -> None:
+def fault(it: Rig, sentence: str, patience: float = 3.0) -> bool:
+    return wait_for(lambda: sentence in it.driver.read().faults, patience)
+
+
+def test_a_silent_motor_is_a_fault_within_its_watchdog_and_the_others_go_on(nao: RobotModel) -> None:
     with rig(nao, "LKneePitch:silent@0.6", compensation=False) as it:
         it.driver.connect()
         assert it.driver.read().alarms == ()
-        assert alarm(it, "motor 11 (LKneePitch) is silent", 1.5)
-        assert it.driver.read().alarms == ("motor 11 (LKneePitch) is silent",)
+        assert fault(it, "motor 11 (LKneePitch) is silent", 1.5)
+        assert it.driver.read().faults == ("motor 11 (LKneePitch) is silent",)
+        assert it.driver.read().alarms == ()
+        assert {motor.status for motor in it.stub.motors.values()} == {"following"}
 
 
-def test_a_motor_with_wrong_checksums_is_counted_and_an_alarm_and_not_believed(nao: RobotModel) -> None:
+def test_a_motor_with_wrong_checksums_is_counted_and_a_fault_and_not_believed(nao: RobotModel) -> None:
     with rig(nao, "3:crc@0.6", compensation=False) as it:
         it.driver.connect()
-        assert alarm(it, "motor 3 (LShoulderPitch) sends damaged frames", 1.5)
+        assert fault(it, "motor 3 (LShoulderPitch) sends damaged frames only", 1.5)
         assert it.driver.counts.damaged > 0
         before = it.driver.read().q[2]
         it.stub.motors[3].position += 0.5
@@ -45,7 +51,8 @@ def test_a_hot_motor_is_an_alarm_before_it_switches_itself_off(nao: RobotModel) 
         it.driver.connect()
         assert alarm(it, "motor 13 (LAnkleRoll) is hot (over 75 degrees)")
         assert it.stub.motors[13].status == "following"
-        assert alarm(it, "motor 13 (LAnkleRoll) has switched itself off: hot")
+        assert it.driver.read().faults == ()
+        assert fault(it, "motor 13 (LAnkleRoll) has switched itself off: hot")
 
 
 def test_a_motor_that_is_stuck_is_found_by_where_it_does_not_go(nao: RobotModel) -> None:
@@ -54,8 +61,10 @@ def test_a_motor_that_is_stuck_is_found_by_where_it_does_not_go(nao: RobotModel)
         q = nao.postures["stand"].copy()
         q[0] = 0.8
         it.driver.write(command(nao, q))
-        assert alarm(it, "motor 1 (HeadYaw) does not get where it is sent")
-        assert len(it.driver.read().alarms) == 1
+        assert alarm(it, "motor 1 (HeadYaw) is behind where it is sent")
+        assert it.driver.read().faults == ()
+        assert fault(it, "motor 1 (HeadYaw) does not get where it is sent")
+        assert it.driver.read().alarms == ()
 
 
 def test_a_motor_that_leaves_the_bus_is_missed_and_then_found_off(nao: RobotModel) -> None:
@@ -63,12 +72,24 @@ def test_a_motor_that_leaves_the_bus_is_missed_and_then_found_off(nao: RobotMode
         it.driver.connect()
         assert alarm(it, "error frames on the CAN bus")
         assert it.driver.counts.errors >= 1
-        assert alarm(it, "motor 20 (RShoulderRoll) is silent")
+        assert fault(it, "motor 20 (RShoulderRoll) is silent")
         assert wait_for(lambda: not it.stub.motors[20].has("bus-off", time.monotonic() - it.stub._start))
-        assert alarm(it, "motor 20 (RShoulderRoll) does not follow any more: off")
+        assert fault(it, "motor 20 (RShoulderRoll) has stopped following: off")
         assert it.stub.motors[20].stiffness == 0.0  # it does not jump back to full stiffness by itself
         it.driver.connect()
         assert it.driver.read().alarms == ()
+
+
+def test_one_damaged_frame_is_an_alarm_for_a_second_and_no_fault(nao: RobotModel) -> None:
+    with rig(nao, compensation=False) as it:
+        it.driver.connect()
+        with can.Bus(interface="virtual", channel=it.channel) as other:
+            other.send(can.Message(arbitration_id=0x203, is_extended_id=False, data=bytes(8)))
+            assert alarm(it, "motor 3 (LShoulderPitch) sends damaged frames")
+        for _ in range(20):
+            assert it.driver.read().faults == ()
+            time.sleep(0.02)
+        assert wait_for(lambda: it.driver.read().alarms == ())
 
 
 def test_our_own_bus_off_is_told_apart(nao: RobotModel) -> None:
@@ -92,8 +113,9 @@ def test_a_bus_that_takes_nothing_is_an_alarm_and_the_driver_lives(
         with monkeypatch.context() as patch:
             patch.setattr(can.interfaces.virtual.VirtualBus, "send", refuse)
             assert alarm(it, "the CAN bus takes no commands (Transmit buffer full)")
+            assert fault(it, "every motor is silent (the CAN bus takes no commands (Transmit buffer full))")
         assert it.driver.counts.unsent > 0
-        assert wait_for(lambda: it.driver.read().alarms == ())
+        assert wait_for(lambda: it.driver.read().alarms == it.driver.read().faults == ())
 
 
 def test_frames_that_get_lost_are_counted(nao: RobotModel) -> None:

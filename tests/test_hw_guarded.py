@@ -43,6 +43,7 @@ class FakeRobot:
         self.angles = np.zeros(2)
         self.fell, self.alarms, self.time = False, (), 0.0
         self.alarms: tuple[str, ...]
+        self.faults: tuple[str, ...] = ()
         self.breaks: set[str] = set()
         self.slow = 0.0
 
@@ -55,7 +56,7 @@ class FakeRobot:
         self.time += DT
         gyro = np.zeros(3)
         state = (self.time, STAND, NAN, self.angles, gyro, np.zeros(3), np.zeros((2, 4)), self.fell)
-        return RobotState(*state, alarms=self.alarms)
+        return RobotState(*state, alarms=self.alarms, faults=self.faults)
 
     def write(self, command: RobotCommand) -> None:
         self._do(command)
@@ -308,33 +309,120 @@ def test_lean_does_not_depend_on_the_heading() -> None:
     assert np.isnan(lean(quat, np.full(2, np.nan)))
 
 
-def test_alarms_are_shown_and_stop_only_where_asked() -> None:
+def test_alarms_are_shown_and_end_nothing() -> None:
     guard, robot = guarded()
     robot.alarms = ("RKneePitch is hot",)
     for i in range(100):
         guard.write(command(i * DT))
     assert guard.status.alarms == robot.alarms
     assert guard.status.condition is Condition.LIVE
-    guard, robot = guarded(GuardSettings(stop_on_alarm=True))
-    robot.alarms = ("RKneePitch is hot",)
-    for i in range(25):
-        guard.write(command(i * DT))
-    assert guard.status.condition is Condition.LIVE, "not at once"
-    for i in range(25, 60):
-        guard.write(command(i * DT))
+    assert guard.status.accepted == 100
+
+
+def test_a_fault_that_lasts_ends_the_motion_and_the_robot_holds_its_pose_stiff() -> None:
+    guard, robot = guarded()
+    robot.alarms, robot.faults = ("battery at 12 %",), ("RKneePitch is silent",)
+    moment = 0.0
+    while guard.status.condition is Condition.LIVE:
+        moment += DT
+        guard.write(command(moment))
+        assert moment <= GuardSettings().fault_patience + 2 * DT
+    assert moment >= GuardSettings().fault_patience, "not at once"
+    held = guard.command
+    for i in range(1, 100):
+        guard.write(command(moment + i * DT))
+    status = guard.status
+    assert status.condition is Condition.FAULT
+    assert status.problem == "RKneePitch is silent"
+    assert status.alarms == ("RKneePitch is silent", "battery at 12 %")
+    assert status.refusing == (NOT_LIVE,)
+    assert guard.command is held
+    assert all(isinstance(d, RobotCommand) for d in robot.done[1:]), "neither softened nor let go of"
+    robot.faults = ()
+    guard.write(command(moment + 100 * DT))
+    assert guard.status.condition is Condition.FAULT, "a person has to look after it first"
+    guard.soften(0.3)
+    guard.stop()
+    assert robot.done[-2:] == [("soften", 0.3), "stop"]
     assert guard.status.condition is Condition.STOPPED
-    assert guard.status.problem == "RKneePitch is hot"
-    assert robot.done[-1] == "stop"
+    assert guard.status.problem == "RKneePitch is silent"
+    guard.connect()
+    assert guard.status.condition is Condition.LIVE
+
+
+def test_a_robot_that_falls_while_it_holds_its_pose_is_softened_and_let_go_of() -> None:
+    guard, robot = guarded()
+    robot.faults = ("RKneePitch is silent",)
+    for i in range(30):
+        guard.write(command(i * DT))
+    assert guard.status.condition is Condition.FAULT
+    robot.angles = np.array([0.6, 0.0])
+    for _ in range(120):
+        guard.read()
+    assert robot.done[-2:] == [("soften", GuardSettings().fall_stiffness), "stop"]
+    assert guard.status.condition is Condition.FALLEN
+
+
+def test_an_emergency_stop_ends_a_fault() -> None:
+    guard, robot = guarded()
+    robot.faults = ("RKneePitch is silent",)
+    for i in range(30):
+        guard.write(command(i * DT))
+    guard.emergency_stop()
+    guard.stop()
+    assert robot.done[-3:] == ["emergency stop", ("soften", GuardSettings().emergency_stiffness), "stop"]
+    assert guard.status.condition is Condition.EMERGENCY
+
+
+def test_faults_that_come_and_go_or_are_a_pause_of_the_computer_end_nothing() -> None:
+    guard, robot = guarded()
+    for i in range(200):
+        robot.faults = ("every motor is silent",) if i % 10 else ()
+        robot.time += 1.0 if i % 10 == 1 else 0.0
+        guard.write(command(i * DT))
+    assert guard.status.condition is Condition.LIVE
+
+
+def test_a_robot_whose_state_grows_old_is_in_fault_too() -> None:
+    """Its clock stands still, ours does not."""
+    robot = FakeRobot()
+    now = [0.0]
+    guard = GuardedDriver(robot, GATE, clock=lambda: now[0])
+    guard.connect()
+    state = replace(robot.read(), faults=("the robot has not answered for 2 s",))
+    robot.read = lambda: state  # type: ignore[method-assign]
+    for _ in range(30):
+        now[0] += DT
+        guard.read()
+    assert guard.status.condition is Condition.FAULT
+    assert guard.status.problem == "the robot has not answered for 2 s"
 
 
 def test_a_robot_that_cannot_be_watched_is_let_go_of() -> None:
     guard, robot = guarded()
     robot.breaks = {"read"}
     with pytest.raises(DriverError, match="answer"):
-        guard.write(command(0.0))
+        guard.read()
     assert robot.done == ["connect", "stop"]
     assert guard.status.condition is Condition.STOPPED
     assert guard.status.problem == "the robot does not answer"
+
+
+def test_writing_to_a_robot_that_fails_ends_in_a_state_and_not_in_an_error() -> None:
+    guard, robot = guarded()
+    robot.breaks = {"read"}
+    guard.write(command(0.0))
+    assert robot.done == ["connect", "stop"]
+    guard, robot = guarded()
+
+    def refuse(_: RobotCommand) -> None:
+        raise DriverError("the robot takes nothing")
+
+    robot.write = refuse  # type: ignore[method-assign]
+    guard.write(command(0.0))
+    assert robot.done == ["connect", "stop"]
+    assert guard.status.condition is Condition.STOPPED
+    assert guard.status.problem == "the robot takes nothing"
 
 
 def test_after_an_emergency_stop_the_simulated_robot_holds_its_pose() -> None:

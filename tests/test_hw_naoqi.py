@@ -214,8 +214,38 @@ def test_heat_battery_and_silence_are_alarms(connect: Callable[..., NaoqiDriver]
     assert driver.read().alarms == ("RKneePitch is very hot: much less stiffness", "battery at 8 %")
     fake.order("event", "answering", False)
     wait_for(lambda: "not answered" in driver.read().alarms[-1])
+    assert driver.read().faults == ()
     fake.order("event", "answering", True)
     wait_for(lambda: len(driver.read().alarms) == 2)
+
+
+def test_what_makes_a_robot_disobey_is_a_fault(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
+    driver = connect()
+    fake.heats("RKneePitch", 3)
+    fake.feels("Battery/Charge", 0.04)
+    wait_for(lambda: len(driver.read().faults) == 2)
+    assert driver.read().faults == ("RKneePitch is too hot and has no stiffness any more", "battery at 4 %")
+    assert driver.read().alarms == ()
+    fake.order("event", "answering", False)
+    wait_for(lambda: driver.read().faults[-1] == "the robot has not answered for 2 s")
+    fake.order("event", "answering", True)
+    wait_for(lambda: len(driver.read().faults) == 2)
+
+
+def test_behind_the_guard_a_robot_that_falls_silent_is_in_fault_and_one_that_is_lost_is_let_go_of(
+    fake: RemoteNao,
+) -> None:
+    guard = GuardedDriver(NaoqiDriver(NAO, NaoqiSettings(url=fake.order("serve"))), CommandGate(NAO))
+    guard.connect()
+    fake.order("event", "answering", False)
+    wait_for(lambda: guard.write(command(STAND)) or guard.status.condition is Condition.FAULT)
+    assert guard.status.problem == "the robot has not answered for 2 s"
+    assert ("rest",) not in fake.done
+    fake.order("event", "answering", True)
+    guard.connect()
+    fake.order("close")
+    wait_for(lambda: guard.write(command(STAND)) or guard.status.condition is Condition.STOPPED)
+    assert guard.status.problem.startswith("the connection to the robot broke")
 
 
 def test_sensors_that_a_robot_does_not_have_are_nan(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:

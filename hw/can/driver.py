@@ -27,10 +27,13 @@ from naoimitate.hw.can.startup import Startup
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
+from naoimitate.hw.spell import Spell
 from naoimitate.robot.model import RobotModel
 
 USUAL_BITRATE = 1_000_000
 """bit/s of a CAN bus in a robot, where robot.yaml says nothing: the fastest that classic CAN has."""
+FAULTY = 0.3
+"""s that a fault may last on the way to ``stand``."""
 LATEST = 2
 """Periods that a late cycle may make up for at most."""
 
@@ -162,6 +165,7 @@ class CanDriver:
             fsr=np.full((2, 4), np.nan),
             fell=False,
             alarms=() if link is None else self._health.alarms(now, self._driving()),
+            faults=() if link is None else self._health.faults(now, self._driving()),
         )
 
     def write(self, command: RobotCommand) -> None:
@@ -235,11 +239,16 @@ class CanDriver:
         self._approach = None
 
     def _await(self, true: Callable[[], bool], patience: float) -> None:
-        """Wait while the sending thread works; DriverError when somebody stops the robot meanwhile."""
-        end = time.monotonic() + patience
-        while not true() and time.monotonic() < end:
+        """Wait while the sending thread works; DriverError when somebody stops the robot, or a fault lasts."""
+        now = time.monotonic()
+        end, faulty = now + patience, Spell(now)
+        while not true() and now < end:
             if self._halt.wait(self._period) or self._emergency:
                 raise DriverError(INTERRUPTED)
+            now = time.monotonic()
+            faults = self._health.faults(now, driving=True)
+            if faulty.look(bool(faults), now) > FAULTY:
+                raise DriverError(f"{'; '.join(faults)}: the robot did not come to its stand posture")
 
     def _run(self, link: Link) -> None:
         """The sending thread: a cycle every period, then the way to rest."""
@@ -254,7 +263,7 @@ class CanDriver:
                 self._halt.wait(max(0.0, due - time.monotonic()))
             self._rest(link)
         except Exception as error:
-            self._health.trouble(f"the driver's thread has ended ({error!r})", float("inf"))
+            self._health.fatal(f"the driver's thread has ended ({error!r})")
             raise
 
     def _cycle(self, link: Link, now: float, dt: float) -> None:

@@ -1,7 +1,11 @@
-"""What is wrong on the bus: frames are counted, and what lasts becomes an alarm that a person can read."""
+"""What is wrong on the bus: frames are counted, and what lasts becomes a sentence that a person can read.
+
+An alarm warns of what the robot gets over by itself, or of what may come; a fault says that it cannot be commanded.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +19,9 @@ MEMORY = 1.0
 BEHIND = 0.2
 """rad at the joint that a motor may be away from where it was sent: a fast servo lags by up to half of it."""
 BEHIND_TIME = 0.3
-"""s that it may be further away than that."""
+"""s that it may be further away than that without a warning."""
+BLOCKED_TIME = 1.0
+"""s after which it counts as blocked: a person who holds an arm for a moment ends nothing."""
 BUS_OFF_BIT = 0x40
 """Of an error frame's identifier: the host's controller has left the bus (Linux, linux/can/error.h)."""
 
@@ -47,6 +53,7 @@ class Health:
         self._damaged = np.full(motors, -np.inf)
         self._near = np.full(motors, np.inf)
         self._troubles: dict[str, float] = {}
+        self._ends: tuple[str, ...] = ()
 
     @property
     def counts(self) -> Counts:
@@ -92,27 +99,49 @@ class Health:
         else:
             self._near[np.abs(error) <= BEHIND] = now
 
-    def alarms(self, now: float, driving: bool) -> tuple[str, ...]:
-        """A sentence for everything that is wrong; driving: the motors are expected to follow."""
-        sentences = [sentence for sentence, when in self._troubles.items() if now - when < MEMORY]
-        for motor in range(len(self._map)):
-            if (what := self._complaint(motor, now, driving)) is not None:
-                sentences.append(f"{self._map.title(motor)} {what}")
-        return tuple(sentences)
+    def fatal(self, sentence: str) -> None:
+        """What no waiting mends."""
+        self._ends = (*self._ends, sentence)
 
-    def _complaint(self, motor: int, now: float, driving: bool) -> str | None:
-        """What is worst about a motor."""
+    def alarms(self, now: float, driving: bool) -> tuple[str, ...]:
+        """A sentence for everything that is wrong while the robot still obeys; driving: the motors shall follow."""
+        return (*self._recent(now), *self._of_motors(lambda motor: self._warning(motor, now, driving)))
+
+    def faults(self, now: float, driving: bool) -> tuple[str, ...]:
+        """A sentence for everything because of which the robot does not obey any more."""
+        return (*self._ends, *self._of_motors(lambda motor: self._failure(motor, now, driving), self._recent(now)))
+
+    def _recent(self, now: float) -> tuple[str, ...]:
+        return tuple(sentence for sentence, when in self._troubles.items() if now - when < MEMORY)
+
+    def _of_motors(self, judge: Callable[[int], str | None], bus: tuple[str, ...] = ()) -> tuple[str, ...]:
+        """What is wrong with each motor; in one sentence, with the trouble of the bus, where all have the same."""
+        found = [judge(motor) for motor in range(len(self._map))]
+        if found[0] is not None and len(set(found)) == 1:
+            return (f"every motor {found[0]}" + (f" ({'; '.join(bus)})" if bus else ""),)
+        return tuple(f"{self._map.title(motor)} {what}" for motor, what in enumerate(found) if what is not None)
+
+    def _failure(self, motor: int, now: float, driving: bool) -> str | None:
+        """Why a motor cannot be commanded."""
         status = self.status[motor]
-        if now - self._damaged[motor] < MEMORY:
-            return "sends damaged frames"
         if now - self.seen[motor] > self._map.watchdog[motor]:
-            return "is silent"
+            return "sends damaged frames only" if now - self._damaged[motor] < MEMORY else "is silent"
         if status in FAULTS:
             return f"has switched itself off: {status.value}"
+        if driving and status is not MotorStatus.FOLLOWING:
+            return f"has stopped following: {status.value}"
+        if driving and now - self._near[motor] > BLOCKED_TIME:
+            return "does not get where it is sent"
+        return None
+
+    def _warning(self, motor: int, now: float, driving: bool) -> str | None:
+        """What is worst about a motor that can still be commanded."""
+        if self._failure(motor, now, driving) is not None:
+            return None
+        if now - self._damaged[motor] < MEMORY:
+            return "sends damaged frames"
         if self._temperature[motor] >= self._map.hot[motor]:
             return f"is hot (over {self._map.hot[motor]:g} degrees)"
-        if driving and status is not MotorStatus.FOLLOWING:
-            return f"does not follow any more: {status.value}"
         if driving and now - self._near[motor] > BEHIND_TIME:
-            return "does not get where it is sent"
+            return "is behind where it is sent"
         return None
