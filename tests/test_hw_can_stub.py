@@ -192,7 +192,7 @@ def test_an_interrupted_command_leaves_without_a_traceback(tmp_path: Path) -> No
     [
         (["--fault", "HeadYaw:lazy@1"], "unknown kind 'lazy'"),
         (["--interface", "nonsense"], "no CAN interface 'nonsense'"),
-        (["--database", "/nowhere/can.dbc"], "/nowhere/can.dbc cannot be read"),
+        (["--database", "/nowhere/can.dbc"], "there is no CAN database /nowhere/can.dbc"),
     ],
 )
 def test_mistakes_of_the_command_line_are_one_line(

@@ -11,7 +11,6 @@ from naoimitate.core.errors import DriverError
 from naoimitate.hw.can.codec import Codec
 from naoimitate.hw.can.dbc import DbcCodec
 from naoimitate.hw.can.joints import JointMap
-from naoimitate.robot.load import BUILT_IN
 from naoimitate.robot.model import RobotModel
 
 
@@ -23,12 +22,11 @@ def make_codec(name: str, robot: RobotModel, joint_map: JointMap, database: Path
 
 
 def database_path(robot: RobotModel) -> Path:
-    """The robot's CAN database: beside a built-in robot's data, else as robot.yaml writes the path."""
+    """The robot's CAN database: the path that robot.yaml has, seen from robot.yaml."""
     name = robot.data.get("can", {}).get("database")
     if name is None:
         raise DriverError(f"{robot.name} has no CAN database: name a DBC file as `database` in the section can")
-    beside = BUILT_IN / robot.name / name
-    return beside if beside.is_file() else Path(name)
+    return Path(robot.data.get("folder", "."), name)
 
 
 def _dbc(robot: RobotModel, joint_map: JointMap, database: Path | None) -> Codec:

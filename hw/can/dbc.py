@@ -176,7 +176,7 @@ def _load(path: Path) -> Database:
         database = cantools.database.load_file(path, database_format="dbc")
     except FileNotFoundError:
         raise DriverError(
-            f"there is no CAN database {path}: correct `database` in robot.yaml, or give another"
+            f"there is no CAN database {path}: put it beside robot.yaml, or correct `database` in its section can"
         ) from None
     except (cantools.Error, UnicodeDecodeError, OSError) as error:
         raise DriverError(f"{path} is no readable DBC file ({' '.join(str(error).split())}): correct it") from error

@@ -20,7 +20,6 @@ from crccheck.crc import Crc8SaeJ1850
 from naoimitate.core.errors import DriverError
 from naoimitate.hw.can.stub_faults import StubFault
 from naoimitate.hw.can.stub_motor import AMBIENT, StubMotor
-from naoimitate.robot.load import BUILT_IN
 from naoimitate.robot.model import RobotModel
 
 LOOK = 0.01
@@ -181,8 +180,9 @@ def _motors(robot: RobotModel) -> dict[int, StubMotor]:
 
 def _load(robot: RobotModel, path: Path | None) -> Database:
     name = robot.data["can"].get("database", "can.dbc")
-    beside = BUILT_IN / robot.name / name
-    file = path or (beside if beside.is_file() else Path(name))
+    file = path or Path(robot.data.get("folder", "."), name)
+    if not file.is_file():
+        raise DriverError(f"there is no CAN database {file}: put it beside robot.yaml, or name another")
     try:
         database = cantools.database.load_file(file, database_format="dbc")
     except (OSError, cantools.Error) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,8 @@ def load_robot(name_or_path: str | Path, version: str | None = None) -> RobotMod
     """Load a robot by built-in name or from a folder with robot.urdf and robot.yaml.
 
     version: one of its versions, None = its default one. Every other YAML file of the folder appears in the model's
-    ``data`` under its stem. Raises RobotModelError with what is wrong and what to do.
+    ``data`` under its stem, and the folder's own path under ``folder``, for the files that robot.yaml names.
+    Raises RobotModelError with what is wrong and what to do.
     """
     folder = _folder(name_or_path)
     data = _read_data(folder)
@@ -41,11 +43,12 @@ def load_robot(name_or_path: str | Path, version: str | None = None) -> RobotMod
         urdf = _read_urdf(folder / "robot.urdf")
         version, changes = changes_of(data, version)
         mirror = Mirror(read_mechanism(urdf), data.get("mirror", {}))
-        return build_model(version, apply_changes(urdf, changes, mirror), both_sides(data, mirror))
+        model = build_model(version, apply_changes(urdf, changes, mirror), both_sides(data, mirror))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise RobotModelError(
             f"{folder} holds a value of the wrong form ({error!r}): compare it with a built-in robot"
         ) from error
+    return replace(model, data={**model.data, "folder": str(folder.resolve())})
 
 
 def _folder(name_or_path: str | Path) -> Path:
