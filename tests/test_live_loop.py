@@ -23,7 +23,7 @@ from naoimitate.hw.none import NoDriver
 from naoimitate.live.loop import Beat, Loop, Turn, listen
 from naoimitate.live.protocols.registry import PROTOCOLS
 from naoimitate.live.receiver import Receiver
-from naoimitate.live.recording import Recorder, play, read_recording
+from naoimitate.live.recording import Recorder, Step, play, read_recording
 from naoimitate.live.session import Session, SessionSettings
 from naoimitate.live.stream import Stream
 from naoimitate.motion.builtin import tpose
@@ -164,6 +164,28 @@ def test_a_killed_session_loses_half_a_second_at_most(nao: RobotModel, tmp_path:
     journal_path(out).write_bytes(whole[:-1000])
     assert command(["recover", str(out)]) == 0
     assert 230 - 2 * 51 <= len(load_run(out)) < 230
+
+
+def test_a_session_that_is_killed_keeps_all_but_its_last_second(tmp_path: Path) -> None:
+    arguments = ["--source", "replay:builtin:wave", "--driver", "none", "--out", "run.npz", "--record", "stream.rec"]
+    program = [sys.executable, "-m", "naoimitate.cli", "live", *arguments]
+    with subprocess.Popen(program, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as live:
+        assert live.stdout is not None and live.stderr is not None
+        for line in live.stderr:
+            if line.startswith("tracking"):
+                break
+        tracking = time.monotonic()
+        time.sleep(3.0)
+        live.kill()
+        lasted = time.monotonic() - tracking
+    out = tmp_path / "run.npz"
+    assert command(["recover", str(out)]) == 0
+    run = load_run(out)
+    assert run.session is not None
+    followed = run.time[[state == "tracking" for state in run.session]]
+    assert followed[-1] - followed[0] >= lasted - 1.0
+    steps = [event for event in read_recording(tmp_path / "stream.rec").events if isinstance(event, Step)]
+    assert len(steps) >= len(run)
 
 
 @pytest.mark.parametrize("content", [b"", b"junk", b"\xff" * 100])
