@@ -25,7 +25,7 @@ from naoimitate.live.stream import Stream
 from naoimitate.motion.builtin import relaxed, tpose
 from naoimitate.robot.model import RobotModel
 
-QUICK = SessionSettings(predict=0.05, hold=0.4, back=1.0, blend_in=0.3, blend_back=0.3)
+QUICK = SessionSettings(predict=0.05, hold=0.4, back=1.0, blend_in=0.8, blend_back=0.3)
 PATIENCE = 20.0
 """s until an edge must have been taken."""
 
