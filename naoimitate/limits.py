@@ -81,10 +81,11 @@ def reachable_angles(
 ) -> tuple[Array, Array, Array, Array]:
     """Joint angles (J,) rad that dt s allow from q at a velocity (J,) rad/s: low, high, smooth low, smooth high.
 
-    low and high are due to speed (J,) rad/s alone; the smooth ones also to acceleration (J,) rad/s^2, with room to stop
-    before the limits lower and upper (J,) rad.
+    low and high are due to speed (J,) rad/s: a joint may stop within dt, but from full speed it may not turn round. The
+    smooth ones are due to acceleration (J,) rad/s^2 too, with room to stop before the limits lower and upper (J,) rad.
     """
     low, high = q - speed * dt, q + speed * dt
+    low, high = np.maximum(low, low + velocity * dt), np.minimum(high, high + velocity * dt)
     smooth_low, smooth_high = np.empty_like(q), np.empty_like(q)
     for j in range(q.shape[0]):
         coasting, change = q[j] + velocity[j] * dt, acceleration[j] * dt * dt

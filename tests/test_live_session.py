@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from naoimitate.command_gate import CommandGate
 from naoimitate.core.frames import LANDMARK, HumanFrame, RobotCommand
 from naoimitate.fsm.session import Event, State
 from naoimitate.live.performance import moved
 from naoimitate.live.session import Session, SessionSettings, Tick
-from naoimitate.motion.builtin import builtin_motion, tpose
+from naoimitate.motion.builtin import builtin_motion, relaxed, tpose
 from naoimitate.robot.model import RobotModel
 
 DT = 0.01
@@ -218,3 +219,26 @@ def test_the_fourteen_landmarks_that_imitation_needs_are_enough(nao: RobotModel)
     assert story.states() == ["calibrating", "blending", "tracking"]
     assert {c.support for c in story.commands()} >= {"D", "L"}
     assert_smooth(nao, story)
+
+
+@pytest.mark.parametrize("seed", [3, 8])
+def test_nothing_that_an_operator_and_a_busy_computer_do_is_refused_by_the_gate(nao: RobotModel, seed: int) -> None:
+    rng, gate = np.random.default_rng(seed), CommandGate(nao)
+    session = Session(nao, live=SessionSettings(hold=0.4, back=1.0, blend_in=0.8, blend_back=0.3))
+    session.start()
+    state, now, until, posture = gate.begin(nao.postures["stand"]), 10.0, 0.0, "silence"
+    for _ in range(3000):
+        stall = rng.random() > 0.97
+        dt = rng.uniform(0.02, 0.3) if stall else rng.uniform(0.002, 0.012)
+        now += dt
+        if now > until:
+            until = now + rng.choice([0.1, 0.3, 0.6, 2.0, 3.0])
+            posture = rng.choice(["T-pose", "T-pose", "stand", "march", "silence"])
+        if rng.random() < 0.004:
+            session.tell(rng.choice([Event.CLUTCH, Event.BODY]))
+        if posture != "silence":
+            frame = {"T-pose": tpose(), "stand": relaxed(), "march": MARCH.at(now % MARCH.duration)}[posture]
+            session.see(replace(frame, time=now, support=None), now)
+        verdict = gate.check(state, session.step(now).command, dt)
+        assert verdict.accepted is not None, verdict.refusals
+        state = verdict.state
