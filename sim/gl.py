@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import os
 import sys
+import warnings
 from typing import Any
 
 import mujoco
@@ -43,6 +44,8 @@ class Canvas:
         self._size = mujoco.MjrRect(0, 0, width, height)
 
     def _open(self, backend: str, model: mujoco.MjModel, width: int, height: int) -> None:
+        if backend == "glfw":
+            _need_display()
         self._context: Any = importlib.import_module(f"mujoco.{backend}").GLContext(width, height)
         self._context.make_current()
         self._painter: Any = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_150)
@@ -61,6 +64,31 @@ class Canvas:
         self._context.make_current()
         self._painter.free()
         self._context.free()
+
+
+def _need_display() -> None:
+    """Raise RuntimeError where no window can be made: MuJoCo would go on without a context, and then abort."""
+    reason = no_window()
+    if reason is not None:
+        raise RuntimeError(reason)
+
+
+def no_window() -> str | None:
+    """Why no window with OpenGL can be opened here; None when one can."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        return "there is no display (DISPLAY is not set)"
+    import glfw
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", glfw.GLFWError)
+        if not glfw.init():
+            return f"the display {os.environ.get('DISPLAY', '')} does not answer"
+        glfw.window_hint(glfw.VISIBLE, False)
+        trial = glfw.create_window(64, 64, "", None, None)
+        if trial:
+            glfw.destroy_window(trial)
+        glfw.default_window_hints()
+    return None if trial else f"OpenGL does not work on the display {os.environ.get('DISPLAY', '')}"
 
 
 def _reason(error: Exception) -> str:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
-import imageio.v2 as imageio
 import numpy as np
 from PIL import Image as Pillow
 from PIL import ImageDraw, ImageFont
 
-from naoimitate.core.errors import RenderingUnavailable
 from naoimitate.core.frames import Array, Motion
 from naoimitate.robot.model import RobotModel
+from naoimitate.sim.encoder import encoder
 from naoimitate.sim.gl import Image
 from naoimitate.sim.person import slow_part, stage_person
 from naoimitate.sim.stage import Stage, View
@@ -59,7 +56,7 @@ def render_video(
         centre = _camera_path(base_pos, time)
         if people is not None:
             centre = centre - np.array([0.0, 0.5 * BESIDE * stage.robot_height])
-        with _encoder(path, fps) as video:
+        with encoder(path, fps) as video:
             for number, frame in enumerate(frames):
                 pose = q[frame], base_pos[frame], base_quat[frame]
                 person = None if people is None else people[frame]
@@ -104,17 +101,6 @@ def render_strip(
     strip = np.concatenate([np.concatenate(row, axis=1) for row in rows if row], axis=0)
     _label(strip, [f"{moment:.1f} s" for moment in moments]).save(path)
     return path
-
-
-@contextmanager
-def _encoder(path: Path, fps: float) -> Iterator[Any]:
-    """A writer of mp4 files; what it and its program raise becomes one line."""
-    try:
-        with imageio.get_writer(path, fps=fps, codec="libx264", quality=8) as video:
-            yield video
-    except (OSError, RuntimeError) as error:
-        reason = str(error).strip().splitlines() or [type(error).__name__]
-        raise RenderingUnavailable(f"No video: {path.suffix[1:]} cannot be encoded ({reason[0]})") from error
 
 
 def _people(
