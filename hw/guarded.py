@@ -7,89 +7,27 @@ clock is real time; the gate and the latch behind it are pure.
 from __future__ import annotations
 
 import contextlib
-import enum
 import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError, NaoimitateError
 from naoimitate.core.frames import Array, RobotCommand
-from naoimitate.fsm.fall_latch import Action, FallLatch, FallLimits
+from naoimitate.fsm.fall_latch import Action, FallLatch
+from naoimitate.hw.condition import WATCHED, Condition, Delays, GuardSettings, GuardStatus
 from naoimitate.hw.driver import Driver, RobotState
 from naoimitate.hw.lean import UPRIGHT, lean
 from naoimitate.hw.spell import Spell
+
+__all__ = ["NOT_LIVE", "Condition", "Delays", "GuardSettings", "GuardStatus", "GuardedDriver"]
 
 GRACE = 0.05
 """[s] that an emergency stop waits for the driver to let go of the robot; what takes longer goes on by itself."""
 NOT_LIVE = "not live"
 """Why a command is refused before ``connect`` and after the end."""
-
-
-class Condition(enum.Enum):
-    """What a guarded robot is in; the value is a word for people."""
-
-    OFF = "off"
-    """Not connected yet."""
-    CONNECTING = "connecting"
-    LIVE = "live"
-    """Commands pass."""
-    FAULT = "fault: it holds its pose"
-    """The robot does not obey as it should: no command passes, and the last one stays in force, until ``stop``.
-
-    Nothing is softened: that command is a balanced pose, and a robot that has lost one motor of a leg stands in it as
-    long as all others stay stiff, while a limp one falls for sure. Whether the robot can be let go of, a person sees
-    best: take hold of it, then stop. Should it fall after all, the fall latch softens it as ever."""
-    FALLING = "falling"
-    """Soft; no command passes."""
-    FALLEN = "fallen"
-    """Let go of after a fall, until ``reset``."""
-    EMERGENCY = "emergency stop"
-    """Let go of by ``emergency_stop``, until ``reset``."""
-    STOPPED = "stopped"
-    """Let go of in peace."""
-
-
-WATCHED = (Condition.LIVE, Condition.FAULT, Condition.FALLING)
-"""Conditions in which the robot may still fall."""
-
-
-@dataclass(frozen=True)
-class GuardSettings:
-    """What the guard does when something is wrong."""
-
-    fall: FallLimits = field(default_factory=FallLimits)
-    fall_stiffness: float = 0.1
-    """Share of the servos' stiffness while the robot falls: soft joints give way, and gears survive."""
-    emergency_stiffness: float = 0.6
-    """The same in an emergency stop: people caught get loose, and a robot on both feet still stands."""
-    fault_patience: float = 0.3
-    """[s] for which a fault of the driver must last to end the motion: a motor that missed a few frames may come back.
-    Alarms are only shown."""
-
-
-@dataclass(frozen=True)
-class GuardStatus:
-    """What to show to an operator.
-
-    condition: see ``Condition``. accepted: commands that reached the robot. refused: how many did not, by reason (one
-    command may have several). refusing: why the newest command was refused; empty when it passed. held: s since a
-    command passed. lean: rad of the torso away from its plan at the last reading, NaN where nobody
-    measures it. alarms: all that the robot complains about, its faults first. problem: what ended the motion, or what
-    a driver complained about when it was last used, or empty.
-    """
-
-    condition: Condition
-    accepted: int
-    refused: Mapping[str, int]
-    refusing: tuple[str, ...]
-    held: float
-    lean: float
-    alarms: tuple[str, ...]
-    problem: str
 
 
 class GuardedDriver:
@@ -115,6 +53,7 @@ class GuardedDriver:
         self._over: Condition | None = None
         self._accepted, self._refused = 0, Counter[str]()
         self._refusing: tuple[str, ...] = ()
+        self._catching_up, self._delays = False, Delays()
         self._alarms: tuple[str, ...] = ()
         self._command: RobotCommand | None = None
         self._passed = self._checked = self._sensed = 0.0
@@ -128,8 +67,13 @@ class GuardedDriver:
 
     @property
     def command(self) -> RobotCommand | None:
-        """The command in force: the last one that passed."""
+        """The command in force: the last one that passed, or the last step of catching up."""
         return self._command
+
+    @property
+    def delays(self) -> Delays:
+        """How long the newest ``write`` took, and in what."""
+        return self._delays
 
     @property
     def _condition(self) -> Condition:
@@ -150,6 +94,7 @@ class GuardedDriver:
                 self._lean,
                 self._alarms,
                 self._problem,
+                self._catching_up and self._condition is Condition.LIVE,
             )
 
     def connect(self) -> None:
@@ -199,7 +144,11 @@ class GuardedDriver:
         return state
 
     def write(self, command: RobotCommand) -> None:
-        """Let a command pass, or hold the last one: ``status`` says which and why. A driver that fails is let go of."""
+        """Let a command pass, or a step towards it, or hold the last one: ``status`` says which and why.
+
+        A robot that was held while its method went on catches up by steps of the gate, see ``CommandGate.catch_up``. A
+        driver that fails is let go of.
+        """
         with self._lock:
             if self._condition in WATCHED:
                 with contextlib.suppress(NaoimitateError):  # it has ended the motion, and ``status`` says why
@@ -207,16 +156,17 @@ class GuardedDriver:
             if self._condition is not Condition.LIVE:
                 self._refuse((NOT_LIVE,))
                 return
-            now = self._clock()
-            verdict = self._gate.check(self._gate_state, command, now - self._checked)
+            now, started = self._clock(), time.perf_counter()
+            verdict = self._gate.catch_up(self._gate_state, command, now - self._checked)
             self._checked, self._gate_state = now, verdict.state
-            if verdict.accepted is None:
-                self._refuse(tuple(refusal.value for refusal in verdict.refusals))
-                return
-            if self._condition is Condition.LIVE:  # an emergency stop may have come in between
-                self._command, self._passed, self._refusing = command, now, ()
-                self._accepted += 1
+            self._refuse(tuple(refusal.value for refusal in verdict.refusals))
+            gated = time.perf_counter()
+            if verdict.accepted is not None and self._condition is Condition.LIVE:  # no emergency stop in between
+                self._command, self._passed = verdict.accepted, now
+                self._accepted += not verdict.refusals
                 self._hand_over(verdict.accepted)
+            self._catching_up = verdict.accepted is not None and bool(verdict.refusals)
+            self._delays = Delays(gated - started, time.perf_counter() - gated)
 
     def _hand_over(self, command: RobotCommand) -> None:
         try:

@@ -3,6 +3,9 @@
 Nothing that a command says about itself is believed: balance and feet are computed again from its joints and torso. The
 gate is a pure function with the state that it needs; a refused command means that the last accepted one is held, which
 is safe, since it passed.
+
+A method that goes on while its commands are refused may be too far away to be followed at once when they are good
+again. ``catch_up`` then gives the robot a way of its own: calm steps towards it, each as safe as any command.
 """
 
 from __future__ import annotations
@@ -16,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from naoimitate.balance.legs import LegLimits, Legs, build_legs
+from naoimitate.between import Between
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.core.geometry import matrix_from_quat
 from naoimitate.gate import GateModel, build_gate, outline_travel, range_excess, speed_ratio, support_margin
@@ -46,6 +50,10 @@ class Refusal(enum.Enum):
     """Both feet carried, carry, and move against each other."""
 
 
+PACE = frozenset((Refusal.SPEED, Refusal.ACCELERATION))
+"""Refusals of a pose that is safe in itself, but too far from the one in force."""
+
+
 @dataclass(frozen=True)
 class CommandLimits:
     """What a command must keep to reach a robot: the bars of the scores, a little wider than what the method plans."""
@@ -70,6 +78,10 @@ class CommandLimits:
     """By which a quaternion's length may differ from 1."""
     max_dt: float = 0.05
     """[s] of elapsed time that a single step may use up, however long the last accepted command is held."""
+    catch_up_share: float = 0.3
+    """Share of the no-load speed with which a robot catches up: about what an arm that waves needs."""
+    overlap: float = 5e-4
+    """[m] by which the body may touch itself while it catches up (or no more than before)."""
     clock_lead: float = 0.1
     """[s] of time to move in that may be given out before it has passed: a burst after a pause of the computer."""
 
@@ -96,6 +108,7 @@ class GateState:
     time: s, of the last accepted command; -inf before the first. held: s of real time since it was accepted. lead: s by
     which the clock of the commands has run ahead of the real one. planted: the soles (2, 3) m, (2, 3, 3) as they were
     when both carried for the first time since one did not; None while one does not. accepted: the command in force.
+    newest: the last well-formed command, accepted or not.
     """
 
     q: Array
@@ -105,10 +118,11 @@ class GateState:
     lead: float = 0.0
     planted: tuple[Array, Array] | None = None
     accepted: RobotCommand | None = None
+    newest: RobotCommand | None = None
 
 
 class Verdict(NamedTuple):
-    """The state after a command, the command if it was accepted, and else why not."""
+    """The state after a command; what may be handed over, the command or a step towards it; why not the command."""
 
     state: GateState
     accepted: RobotCommand | None
@@ -121,10 +135,11 @@ class CommandGate:
     def __init__(self, robot: RobotModel, limits: CommandLimits | None = None) -> None:
         self.limits = limits or CommandLimits()
         self._model, self._legs, self._tree = build_gate(robot), build_legs(robot, LegLimits()), robot.tree
-        self._coupled = robot.coupled
+        self._coupled, self._between = robot.coupled, Between(robot)
         stand = robot.postures["stand"]
         self.feet(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles, so that no command waits for it
         _motion(self._model, stand, stand, np.zeros_like(stand), 1.0)
+        self._between.nearest(stand)
 
     def begin(self, q: Array) -> GateState:
         """The state of a robot that stands still at q (J,) rad, as it was measured."""
@@ -140,6 +155,7 @@ class CommandGate:
         state = replace(state, held=state.held + dt)
         if not self._well_formed(command, len(state.q)):
             return self._refused(state, [Refusal.MALFORMED])
+        state = replace(state, newest=_kept(command))
         elapsed = command.time - state.time if math.isfinite(state.time) else self.limits.max_dt
         lead = max(0.0, state.lead + min(elapsed, self.limits.max_dt) - state.held) if state.accepted else 0.0
         if elapsed <= 0.0 or lead > self.limits.clock_lead:
@@ -152,6 +168,34 @@ class CommandGate:
         if refusals:
             return self._refused(state, refusals)
         return Verdict(self._after(state, command, feet, elapsed, lead), command, ())
+
+    def catch_up(self, state: GateState, command: RobotCommand, dt: float) -> Verdict:
+        """Instead of a command that ``check`` refuses from the same state: a step on the way to it, if that is safe.
+
+        Only towards a method that has gone on by possible steps and stands on the same feet: a jump is held, not
+        followed, and so is a change of feet. The step passes ``check`` itself and keeps the body from touching itself.
+        """
+        held, verdict = state.accepted, self.check(state, command, dt)
+        if verdict.accepted is not None or not self._may_catch_up(state, command, verdict.refusals):
+            return verdict
+        assert held is not None
+        elapsed = min(command.time - state.time, self.limits.max_dt)
+        far = speed_ratio(self._model, command.q, held.q, elapsed)
+        step = self._between.pose(held, command, min(1.0, self.limits.catch_up_share / far))
+        nearest = self._between.nearest(step.q)
+        if nearest < -self.limits.overlap and nearest < self._between.nearest(held.q):
+            return verdict
+        taken = self.check(state, step, dt)
+        return verdict if taken.accepted is None else _instead(taken, verdict)
+
+    def _may_catch_up(self, state: GateState, command: RobotCommand, refusals: tuple[Refusal, ...]) -> bool:
+        """Whether a command was refused for its pace alone, and its method did not jump there."""
+        held, before = state.accepted, state.newest
+        if held is None or before is None or Refusal.SPEED not in refusals or not set(refusals) <= PACE:
+            return False
+        elapsed = min(command.time - before.time, self.limits.max_dt)
+        possible = elapsed > 0.0 and speed_ratio(self._model, command.q, before.q, elapsed) <= self.limits.speed_share
+        return possible and command.support == held.support
 
     def feet(self, q: Array, base_pos: Array, base_quat: Array, support: str) -> Feet:
         """Balance and feet of a pose: q (J,) rad, torso (3,) m, (4,) in the world, on the feet of ``support``."""
@@ -194,7 +238,17 @@ class CommandGate:
         planted = (state.planted or (feet.pos, feet.rot)) if command.support == "D" else None
         first = state.accepted is None  # from where the robot was measured, which is no step of a movement
         velocity = np.zeros_like(state.q) if first else (command.q - state.q) / elapsed
-        return GateState(command.q.copy(), velocity, command.time, 0.0, lead, planted, command)
+        return GateState(command.q.copy(), velocity, command.time, 0.0, lead, planted, state.newest, state.newest)
+
+
+def _kept(command: RobotCommand) -> RobotCommand:
+    """The command's pose for later, whatever its maker does with its arrays."""
+    return replace(command, q=command.q.copy(), base_pos=command.base_pos.copy(), base_quat=command.base_quat.copy())
+
+
+def _instead(taken: Verdict, verdict: Verdict) -> Verdict:
+    """A step taken in place of a command that was refused."""
+    return Verdict(replace(taken.state, newest=verdict.state.newest), taken.accepted, verdict.refusals)
 
 
 @njit(cache=True)

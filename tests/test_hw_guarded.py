@@ -463,6 +463,24 @@ def test_a_fall_in_the_simulation_is_seen_before_the_robot_lies() -> None:
     assert guard.status.condition is Condition.FALLEN
 
 
+def test_the_delays_of_the_gate_and_of_the_hand_over_are_told_apart() -> None:
+    guard, robot = guarded()
+    assert guard.delays == (0.0, 0.0)
+    write = robot.write
+
+    def slowly(command: RobotCommand) -> None:
+        time.sleep(0.02)
+        write(command)
+
+    robot.write = slowly  # type: ignore[method-assign]
+    guard.write(command(0.02))
+    gate, hand_over = guard.delays
+    assert 1e-6 < gate < 0.01
+    assert 0.02 <= hand_over < 0.05
+    guard.write(command(0.04, lift=0.01))
+    assert guard.delays.hand_over < 0.01, "nothing was handed over"
+
+
 def test_no_robot_is_where_it_is_told_to_be() -> None:
     taken: list[RobotCommand] = []
     ticks = count(0.0, DT)

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +23,7 @@ from naoimitate.hw.can.joints import HAND, read_joint_map
 from naoimitate.hw.can.link import Link
 from naoimitate.hw.can.setpoint import Setpoint
 from naoimitate.hw.can.startup import Startup
+from naoimitate.hw.can.target import Servos, Target
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
@@ -53,15 +53,6 @@ class CanSettings:
 
 
 DEFAULT = CanSettings()
-
-
-class _Target(NamedTuple):
-    """The part of a RobotCommand that motors can carry out."""
-
-    q: Array
-    base_quat: Array
-    support: str
-    opening: Array
 
 
 class CanDriver:
@@ -95,10 +86,9 @@ class CanDriver:
         self._period = self._codec.period if period is None else period
         self._bitrate = int(robot.data["can"].get("bitrate", USUAL_BITRATE)) if bitrate is None else bitrate
         self.load = check_load(self._codec.traffic(self._period), self._bitrate, self._period)
-        self._stand = _Target(robot.postures["stand"], UPRIGHT, "D", np.full(2, np.nan))
-        self._compensation = GravityCompensation(robot) if compensation else None
-        if self._compensation is not None:  # compile it before a robot waits for it
-            self._compensation.torque(self._stand.q, UPRIGHT, "D")
+        self._stand = Target(robot.postures["stand"], UPRIGHT, "D", np.full(2, np.nan))
+        self._servos = Servos(self._map, GravityCompensation(robot) if compensation else None)
+        self._servos.angles(self._stand, self._map.lower)  # compiles, before a robot waits for it
         self._speed = np.abs(self._map.factor) * self._map.speed * settings.speed
         self._health = Health(self._map)
         self._link: Link | None = None
@@ -107,8 +97,8 @@ class CanDriver:
         self._starting, self._letting_go = False, threading.RLock()
         self._approach: Approach | None = None
         self._along = 0.0
-        self._target: _Target | None = None
-        self._led: _Target | None = None
+        self._target: Target | None = None
+        self._led: Target | None = None
         self._share, self._wanted, self._emergency = 0.0, 1.0, False
         self._start = time.monotonic()
 
@@ -172,7 +162,7 @@ class CanDriver:
         """Replace the command that the motors are led to; DriverError for one with NaN in its joints."""
         if not np.isfinite(command.q).all():
             raise DriverError("a command with NaN among its joints was kept from the motors: send joint angles in rad")
-        self._target = _Target(command.q.copy(), command.base_quat, command.support, command.hand_opening)
+        self._target = Target(command.q.copy(), command.base_quat, command.support, command.hand_opening)
 
     def soften(self, share: float) -> None:
         """Turn the stiffness down at once, or up again slowly, to a share (0 to 1) of its full value."""
@@ -222,7 +212,7 @@ class CanDriver:
     def _go_to_stand(self, link: Link) -> None:
         """Lead the motors to the posture ``stand`` once they are stiff; hands stay where they are."""
         self._await(self._ramped.is_set, self._settings.ramp + self._settings.patience)
-        goal = self._servo_angles(self._stand)
+        goal = self._servos.angles(self._stand, self._setpoint.angles)
         speed = np.minimum(self._settings.approach, self._map.speed * self._settings.speed)
         way = Approach(self._setpoint.angles, np.clip(goal, self._map.lower, self._map.upper), speed)
         if way.far:
@@ -290,18 +280,8 @@ class CanDriver:
         if target is None:
             return
         if target is not self._led:
-            self._goal, self._led = self._servo_angles(target), target
+            self._goal, self._led = self._servos.angles(target, self._setpoint.angles), target
         self._setpoint.step(self._goal, dt)
-
-    def _servo_angles(self, target: _Target) -> Array:
-        """Joint angles (N,) that servos must be sent to end up at a command."""
-        joints = self._map
-        opening = joints.gather(target.q, target.opening)
-        angles = np.where(np.isnan(opening), self._setpoint.angles, opening)  # a hand without a command stays
-        if self._compensation is not None:
-            torque = self._compensation.torque(target.q, target.base_quat, target.support)
-            angles = angles + np.where(joints.joint == HAND, 0.0, torque[joints.joint] / joints.stiffness)
-        return np.asarray(angles)
 
     def _targets(self, position: Array) -> Targets:
         """Targets at motor positions (N,) rad with the speed limits and the stiffness of the moment."""
