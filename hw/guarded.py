@@ -56,6 +56,7 @@ class GuardedDriver:
         self._catching_up, self._delays = False, Delays()
         self._alarms: tuple[str, ...] = ()
         self._command: RobotCommand | None = None
+        self._state: RobotState | None = None
         self._passed = self._checked = self._sensed = 0.0
         self._faulty = Spell(0.0)
         self._lean = math.nan
@@ -74,6 +75,11 @@ class GuardedDriver:
     def delays(self) -> Delays:
         """How long the newest ``write`` took, and in what."""
         return self._delays
+
+    @property
+    def state(self) -> RobotState | None:
+        """The newest reading; None before the first."""
+        return self._state
 
     @property
     def _condition(self) -> Condition:
@@ -140,6 +146,7 @@ class GuardedDriver:
             self._end(Condition.STOPPED)
             raise
         with self._lock:
+            self._state = state
             self._watch(state)
         return state
 

@@ -30,7 +30,7 @@ from naoimitate.motion.builtin import tpose
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.columns import constants
 from naoimitate.run.file import load_run
-from naoimitate.run.journal import Journal, finish, journal_path
+from naoimitate.run.journal import Journal, Moved, Row, finish, journal_path
 
 QUICK = SessionSettings(predict=0.05, hold=0.15, back=0.5, blend_in=0.2, blend_back=0.2)
 JSON = PROTOCOLS["json"]
@@ -138,14 +138,15 @@ def test_an_address_of_another_machine_is_one_clear_error(bind: str) -> None:
         Receiver(bind, 0)
 
 
-def journal(nao: RobotModel, out: Path, frames: int) -> Journal:
+def journal(nao: RobotModel, out: Path, frames: int, simulated: bool = False) -> Journal:
     session = Session(nao)
     session.start()
     fixed = constants(nao, session.imitator.mapping, "planted", "live:json", "{}")
     written = Journal(out, fixed)
     for k in range(frames):
         tick = session.step(0.01 * k)
-        written.add(tick.command, tick.arrival, tick.state.value, np.nan, 1e-3)
+        moved = Moved(tick.command.q, tick.command.base_pos, tick.command.base_quat, k == 7) if simulated else None
+        written.add(Row(tick.command, tick.arrival, tick.state.value, np.nan, 1e-3, moved))
     return written
 
 
@@ -155,6 +156,12 @@ def test_a_journal_becomes_a_run_file(nao: RobotModel, tmp_path: Path) -> None:
     assert made is not None and len(made) == len(load_run(out)) == 130
     assert made.session is not None and set(made.session) == {"waiting"}
     assert not journal_path(out).exists()
+
+
+def test_a_journal_keeps_how_the_simulated_robot_moved(nao: RobotModel, tmp_path: Path) -> None:
+    run = journal(nao, tmp_path / "run.npz", 130, simulated=True).close()
+    assert run is not None and run.sim_fell is True
+    assert np.array_equal(run.sim_q, run.q)
 
 
 def test_a_killed_session_loses_half_a_second_at_most(nao: RobotModel, tmp_path: Path) -> None:

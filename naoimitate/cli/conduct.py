@@ -48,7 +48,7 @@ def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Record
     from naoimitate.live.loop import Loop
 
     feed, driver = rig.feed, rig.driver
-    writer = Writer(out, rig.session, rig.robot, feed.name)
+    writer = Writer(out, rig.session, driver, rig.robot, feed.name)
     loop = Loop(rig.session, driver, [writer.take])
     if recorder is not None:
         loop.watch.append(recorder.beat)

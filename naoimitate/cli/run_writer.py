@@ -6,17 +6,20 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from naoimitate.hw.guarded import GuardedDriver
     from naoimitate.live.loop import Beat
     from naoimitate.live.session import Session
     from naoimitate.robot.model import RobotModel
-    from naoimitate.run.journal import Journal
+    from naoimitate.run.journal import Journal, Row
 
 
 class Writer:
     """The run files of a session: a new one with every calibration."""
 
-    def __init__(self, out: Path | None, session: Session, robot: RobotModel, source: str) -> None:
-        self._out, self._session, self._robot, self._source = out, session, robot, source
+    def __init__(
+        self, out: Path | None, session: Session, driver: GuardedDriver, robot: RobotModel, source: str
+    ) -> None:
+        self._out, self._session, self._driver, self._robot, self._source = out, session, driver, robot, source
         self._journal: Journal | None = None
         self._begin: float | None = None
         self._written: list[str] = []
@@ -30,10 +33,17 @@ class Writer:
         if beat.tick.began or (self._journal is None and beat.tick.fresh):
             self._next()
         if self._journal is not None:
-            tick = beat.tick
-            self._journal.add(
-                tick.command, tick.arrival - self._begin, tick.state.value, beat.latency, beat.turn.step_time
-            )
+            self._journal.add(self._row(beat, beat.tick.arrival - self._begin))
+
+    def _row(self, beat: Beat, human_time: float) -> Row:
+        """A turn as a frame of the run file."""
+        from naoimitate.run.journal import Moved, Row
+
+        tick, state = beat.tick, self._driver.state
+        moved = None
+        if state is not None and state.base_pos is not None and state.base_quat is not None:
+            moved = Moved(state.q, state.base_pos, state.base_quat, state.fell)
+        return Row(tick.command, human_time, tick.state.value, beat.latency, beat.turn.step_time, moved)
 
     def close(self) -> list[str]:
         """Finish the last run file; a line for each."""
@@ -42,7 +52,7 @@ class Writer:
 
     def _next(self) -> None:
         from naoimitate.run.columns import constants
-        from naoimitate.run.journal import Journal
+        from naoimitate.run.journal import Journal, Row
         from naoimitate.run.provenance import provenance
 
         assert self._out is not None

@@ -10,12 +10,12 @@ import io
 import os
 import struct
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
 from naoimitate.core.errors import RunFileError
-from naoimitate.core.frames import RobotCommand
+from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.run.columns import columns
 from naoimitate.run.file import DAMAGE, Run, save
 
@@ -31,22 +31,42 @@ def journal_path(out: Path) -> Path:
     return out.with_name(out.name + ".journal")
 
 
+class Moved(NamedTuple):
+    """As the simulated robot really was at a frame: joints (J,) rad, torso (3,) m and (4,), whether it had fallen."""
+
+    q: Array
+    base_pos: Array
+    base_quat: Array
+    fell: bool
+
+
+class Row(NamedTuple):
+    """One frame. human_time, latency: s, NaN where there is none. moved: None without a simulation."""
+
+    command: RobotCommand
+    human_time: float
+    session: str
+    latency: float
+    step_time: float
+    moved: Moved | None = None
+
+
 class Journal:
     """A run that grows by a frame at a time. Raises RunFileError where it cannot be written."""
 
     def __init__(self, out: Path, constants: dict[str, Any]) -> None:
         self.out, self._path = out, journal_path(out)
-        self._rows: list[tuple[RobotCommand, float, str, float, float]] = []
+        self._rows: list[Row] = []
         try:
             self._file: BinaryIO = self._path.open("wb")
         except OSError as error:
             raise RunFileError(f"cannot write {self._path}: {error.strerror}; choose another folder") from error
         self._write(constants)
 
-    def add(self, command: RobotCommand, human_time: float, session: str, latency: float, step_time: float) -> None:
-        """One frame; human_time and latency: s, NaN where there is none."""
-        self._rows.append((command, human_time, session, latency, step_time))
-        if command.time - self._rows[0][0].time >= CHUNK:
+    def add(self, row: Row) -> None:
+        """One frame; all of a run with, or all without a simulation."""
+        self._rows.append(row)
+        if row.command.time - self._rows[0].command.time >= CHUNK:
             self._flush()
 
     def close(self) -> Run | None:
@@ -58,7 +78,7 @@ class Journal:
     def _flush(self) -> None:
         if not self._rows:
             return
-        commands, human, session, latency, step = zip(*self._rows, strict=True)
+        commands, human, session, latency, step, moved = zip(*self._rows, strict=True)
         arrays = columns(commands)
         tracked = np.isfinite(np.array(human))
         arrays["human_posture"] = np.where(tracked[:, None, None], arrays["human_posture"], np.nan)
@@ -68,6 +88,10 @@ class Journal:
             "latency": np.array(latency),
             "step_time": np.array(step),
         }
+        if None not in moved:
+            q, base_pos, base_quat, fell = zip(*moved, strict=True)
+            arrays |= {"sim_q": np.array(q), "sim_base_pos": np.array(base_pos), "sim_base_quat": np.array(base_quat)}
+            arrays["sim_fell"] = np.array(fell)
         self._write(arrays)
         self._rows.clear()
 
@@ -99,6 +123,8 @@ def finish(out: Path) -> Run | None:
         path.unlink()
         return None
     values = {key: np.concatenate([frame[key] for frame in frames]) for key in frames[0]}
+    if "sim_fell" in values:
+        values["sim_fell"] = values["sim_fell"].any()
     run = Run(**{key: value.item() if value.ndim == 0 else value for key, value in {**constants, **values}.items()})
     save(run, out)
     os.unlink(path)
