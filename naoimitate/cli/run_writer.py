@@ -52,7 +52,7 @@ class Writer:
 
     def _next(self) -> None:
         from naoimitate.run.columns import constants
-        from naoimitate.run.journal import Journal, Row
+        from naoimitate.run.journal import Journal
         from naoimitate.run.provenance import provenance
 
         assert self._out is not None
