@@ -7,7 +7,8 @@ import pytest
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError
 from naoimitate.fsm.session import Event, State
-from naoimitate.hw.guarded import Condition, GuardedDriver
+from naoimitate.hw.condition import Condition
+from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.hw.none import NoDriver
 from naoimitate.live.keys import obey
 from naoimitate.live.session import Session

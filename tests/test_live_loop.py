@@ -17,8 +17,9 @@ import pytest
 from naoimitate.cli import run as command
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import RunFileError, StreamError
+from naoimitate.hw.condition import Condition
 from naoimitate.hw.driver import Driver
-from naoimitate.hw.guarded import Condition, GuardedDriver
+from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.hw.none import NoDriver
 from naoimitate.live.loop import Beat, Loop, Turn, listen
 from naoimitate.live.protocols.registry import PROTOCOLS

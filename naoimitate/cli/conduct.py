@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ PATIENCE = 3.0
 
 @dataclass(frozen=True)
 class Rig:
-    """Everything that a session is made of."""
+    """Everything that a session is made of; watch: open while it lasts."""
 
     feed: Feed
     setup: Setup
@@ -36,6 +37,7 @@ class Rig:
     driver: GuardedDriver
     gate: CommandGate
     robot: RobotModel
+    watch: AbstractContextManager[object] = field(default_factory=nullcontext)
 
 
 def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Recorder | None) -> None:
@@ -56,8 +58,9 @@ def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Record
     try:
         rig.session.warm_up()
         driver.connect()
-        click.echo(f"ready: {feed.ready}")
-        _run(rig, loop, turns, math.inf if duration is None else duration)
+        with rig.watch:
+            click.echo(f"ready: {feed.ready}")
+            _run(rig, loop, turns, math.inf if duration is None else duration)
     except KeyboardInterrupt:
         click.echo("ended by the operator", err=True)
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -39,6 +40,9 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 @click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
 @click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
 @click.option("--duration", type=types.SECONDS, help="End after so many seconds.")
+@click.option("--view", is_flag=True, help="Open a window on the simulated robot.")
+@click.option("--camera", default="free", show_default=True, help="What the window looks through.")
+@click.option("--video", type=types.VIDEO_FILE, help="Film what the simulated robot's head camera sees.")
 @click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the raw stream to this file.")
 @click.option("--out", type=types.RUN_FILE, help="Run file to write.")
 @click.pass_context
@@ -58,7 +62,9 @@ def live(context: click.Context, **options: Any) -> None:
     robot = load_robot(*_robot(chosen, feed.header))
     setup = _setup(chosen, feed.header)
     gate = CommandGate(robot)
-    rig = Rig(feed, setup, setup.session(robot), GuardedDriver(_driver(options, robot), gate), gate, robot)
+    driver = _driver(options, robot)
+    guarded, watch = GuardedDriver(driver, gate), _watch(options, driver)
+    rig = Rig(feed, setup, setup.session(robot), guarded, gate, robot, watch)
     conduct(rig, options["duration"], options["out"], _recorder(rig, options))
 
 
@@ -118,3 +124,19 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
     from naoimitate.sim.driver import MujocoDriver
 
     return MujocoDriver(robot)
+
+
+def _watch(options: dict[str, Any], driver: Driver) -> AbstractContextManager[object]:
+    """Window and film of a simulated robot, where they are wished."""
+    from naoimitate.sim.driver import MujocoDriver
+
+    if not options["view"] and options["video"] is None:
+        return nullcontext()
+    if not isinstance(driver, MujocoDriver):
+        raise click.UsageError("--view and --video show a simulated robot: choose --driver mujoco")
+    from naoimitate.sim.watch import Watch
+
+    return Watch(
+        driver, view=options["view"], camera=options["camera"], video=options["video"],
+        notice=lambda line: click.echo(line, err=True),
+    )  # fmt: skip

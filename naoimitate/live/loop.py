@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from naoimitate.fsm.session import Event, State
-from naoimitate.hw.guarded import Condition, GuardedDriver, GuardStatus
+from naoimitate.hw.condition import Condition, GuardStatus
+from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.live.receiver import Datagram, Source
 from naoimitate.live.session import Session, Tick
 from naoimitate.live.stream import Stream
@@ -84,9 +85,8 @@ class Loop:
         """Hand a turn's command over; a fault moves nothing."""
         gate = hand_over = 0.0
         if turn.tick.state is not State.FAULT:
-            started = time.perf_counter()
             self.driver.write(turn.tick.command)
-            gate = time.perf_counter() - started
+            gate, hand_over = self.driver.delays
             self._look_after(self.driver.status)
         latency = time.monotonic() - turn.arrival if turn.tick.fresh else math.nan
         beat = Beat(turn, latency, gate, hand_over)
