@@ -41,8 +41,8 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 @click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
 @click.option("--duration", type=types.SECONDS, help="End after so many seconds.")
 @click.option("--view", is_flag=True, help="Open a window on the simulated robot.")
-@click.option("--camera", default="free", show_default=True, help="What the window looks through.")
-@click.option("--video", type=types.VIDEO_FILE, help="Film what the simulated robot's head camera sees.")
+@click.option("--video", type=types.VIDEO_FILE, help="Film what the simulated robot sees with its head camera.")
+@click.option("--camera", metavar="NAME", help="What window and film look through [default: free; the head's first].")
 @click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the raw stream to this file.")
 @click.option("--out", type=types.RUN_FILE, help="Run file to write.")
 @click.pass_context
@@ -134,9 +134,15 @@ def _watch(options: dict[str, Any], driver: Driver) -> AbstractContextManager[ob
         return nullcontext()
     if not isinstance(driver, MujocoDriver):
         raise click.UsageError("--view and --video show a simulated robot: choose --driver mujoco")
+    from naoimitate.sim.onlookers import FREE
     from naoimitate.sim.watch import Watch
 
+    camera = options["camera"]
     return Watch(
-        driver, view=options["view"], camera=options["camera"], video=options["video"],
+        driver,
+        view=options["view"],
+        camera=camera or FREE,
+        video=options["video"],
+        video_camera=camera,
         notice=lambda line: click.echo(line, err=True),
-    )  # fmt: skip
+    )

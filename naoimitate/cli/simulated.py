@@ -20,7 +20,8 @@ def simulated(run: Run, robot: RobotModel) -> Run:
     from naoimitate.sim.simulate import simulate
 
     with progress("simulating") as advance:
-        result = simulate(robot, run.time, run.q, run.base_pos, run.base_quat, run.support, progress=advance)
+        plan = run.time, run.q, run.base_pos, run.base_quat, run.support
+        result = simulate(robot, *plan, hand_opening=run.hand_opening, progress=advance)
     return dataclasses.replace(
         run,
         sim_base_pos=result.base_pos,
@@ -45,7 +46,7 @@ def write_pictures(
     q, base_pos, base_quat = run.q, run.base_pos, run.base_quat
     if run.sim_q is not None and run.sim_base_pos is not None and run.sim_base_quat is not None:
         q, base_pos, base_quat = run.sim_q, run.sim_base_pos, run.sim_base_quat
-    seen: dict[str, Any] = {"human": motion, "human_time": run.human_time}
+    seen: dict[str, Any] = {"human": motion, "human_time": run.human_time, "hand_opening": run.hand_opening}
     written: list[Path] = []
     try:
         if strip is not None:
