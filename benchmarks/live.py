@@ -20,7 +20,6 @@ from pathlib import Path
 
 import numpy as np
 
-from naoimitate.motion import load_motion
 from naoimitate.motion.builtin import builtin_names
 from naoimitate.run.file import load_run
 
@@ -28,8 +27,6 @@ PROGRAM = [sys.executable, "-m", "naoimitate.cli"]
 PORT = 9921
 TPOSE = 3.0
 """s of T-pose first."""
-BLENDS = 1.0 + 1.5
-"""s from the T-pose into the motion, and of the robot into the person's posture."""
 CAN = ["--can-interface", "udp_multicast", "--can-channel", "239.74.163.2"]
 
 
@@ -52,11 +49,11 @@ def session(motion: str, protocol: str, rate: str, driver: str, folder: Path) ->
     """Stream one motion into one session; a line of what came of it."""
     out = folder / "run.npz"
     out.unlink(missing_ok=True)
-    seconds = TPOSE + BLENDS + load_motion(motion).duration
-    live = ["live", "--source", protocol, "--port", str(PORT), "--driver", driver, "--duration", str(seconds + 2.0)]
+    live = ["live", "--source", protocol, "--port", str(PORT), "--driver", driver]
     stream = ["stream", motion, "--protocol", protocol, "--to", f"127.0.0.1:{PORT}", "--rate", rate]
     with started([*live, "--out", str(out), *(CAN if driver == "can" else [])]) as program:
         subprocess.run([*PROGRAM, *stream, "--tpose", str(TPOSE)], stdout=subprocess.DEVNULL, check=True)
+        program.terminate()
         assert program.stdout is not None
         said = program.stdout.read().splitlines()
     run = load_run(out)
