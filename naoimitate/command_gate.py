@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from numba import njit
 
 from naoimitate.balance.legs import LegLimits, Legs, build_legs
@@ -79,7 +80,12 @@ class CommandLimits:
     max_dt: float = 0.05
     """[s] of elapsed time that a single step may use up, however long the last accepted command is held."""
     catch_up_share: float = 0.3
-    """Share of the no-load speed with which a robot catches up: about what an arm that waves needs."""
+    """Share of the no-load speed with which a robot catches up: about what an arm that waves needs..."""
+    stance_share: float = 0.1
+    """...and with its stance legs, which carry the body, so that it does not tip: about 0.6 rad/s."""
+    stance_leap: float = 0.05
+    """[rad] by which they may be behind at most where there is no calm step and all is made up for at once: a
+    centimetre of the body."""
     overlap: float = 5e-4
     """[m] by which the body may touch itself while it catches up (or no more than before)."""
     clock_lead: float = 0.1
@@ -136,6 +142,12 @@ class CommandGate:
         self.limits = limits or CommandLimits()
         self._model, self._legs, self._tree = build_gate(robot), build_legs(robot, LegLimits()), robot.tree
         self._coupled, self._between = robot.coupled, Between(robot)
+        self._stance = {support: _carrying(robot, support) for support in CARRIES}
+        limits = self.limits
+        self._calm = {
+            support: robot.speed * np.where(carrying, limits.stance_share, limits.catch_up_share)
+            for support, carrying in self._stance.items()
+        }
         stand = robot.postures["stand"]
         self.feet(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles, so that no command waits for it
         _motion(self._model, stand, stand, np.zeros_like(stand), 1.0)
@@ -170,32 +182,51 @@ class CommandGate:
         return Verdict(self._after(state, command, feet, elapsed, lead), command, ())
 
     def catch_up(self, state: GateState, command: RobotCommand, dt: float) -> Verdict:
-        """Instead of a command that ``check`` refuses from the same state: a step on the way to it, if that is safe.
+        """As ``check``; but a robot that was held while its method went on goes after it by calm steps.
 
-        Only towards a method that has gone on by possible steps and stands on the same feet: a jump is held, not
-        followed, and so is a change of feet. The step passes ``check`` itself and keeps the body from touching itself.
+        Only after a method that went on by possible steps: a jump is held, not followed. Each step passes ``check``
+        itself, on the feet that carry the robot until it is there, and keeps the body from touching itself: a foot that
+        the method lifted meanwhile stays down until the method has set it down again. Where there is no such step the
+        last command is held.
         """
-        held, verdict = state.accepted, self.check(state, command, dt)
-        if verdict.accepted is not None or not self._may_catch_up(state, command, verdict.refusals):
-            return verdict
-        assert held is not None
-        elapsed = min(command.time - state.time, self.limits.max_dt)
-        far = speed_ratio(self._model, command.q, held.q, elapsed)
-        step = self._between.pose(held, command, min(1.0, self.limits.catch_up_share / far))
-        nearest = self._between.nearest(step.q)
-        if nearest < -self.limits.overlap and nearest < self._between.nearest(held.q):
-            return verdict
-        taken = self.check(state, step, dt)
-        return verdict if taken.accepted is None else _instead(taken, verdict)
-
-    def _may_catch_up(self, state: GateState, command: RobotCommand, refusals: tuple[Refusal, ...]) -> bool:
-        """Whether a command was refused for its pace alone, and its method did not jump there."""
+        verdict = self.check(state, command, dt)
         held, before = state.accepted, state.newest
-        if held is None or before is None or Refusal.SPEED not in refusals or not set(refusals) <= PACE:
-            return False
-        elapsed = min(command.time - before.time, self.limits.max_dt)
-        possible = elapsed > 0.0 and speed_ratio(self._model, command.q, before.q, elapsed) <= self.limits.speed_share
-        return possible and command.support == held.support
+        if held is None or before is None or before is held or not set(verdict.refusals) <= PACE:
+            return verdict
+        may = self._calm_step(held, before, command)
+        if (np.abs(command.q - held.q) <= may).all():
+            return verdict
+        newest = verdict.state.newest
+        if may.any():
+            step = self._between.step(held, command, may)
+            taken = self.check(state, step, dt)
+            if taken.accepted is not None and not self._touches(step.q, held.q):
+                return Verdict(replace(taken.state, newest=newest), step, (Refusal.SPEED,))
+        if verdict.accepted is None or self._leap(held, command) <= self.limits.stance_leap:
+            return verdict
+        return self._refused(replace(state, held=state.held + max(dt, 0.0), newest=newest), [Refusal.SPEED])
+
+    def _calm_step(self, held: RobotCommand, before: RobotCommand, command: RobotCommand) -> Array:
+        """How far (J,) rad a robot that was held may turn its joints in one step; 0 where the method itself has jumped.
+
+        Every joint as far as the method has just turned it, and by its calm speed on top, so that the robot comes
+        nearer whatever the method does.
+        """
+        time = min(command.time - before.time, self.limits.max_dt)
+        if time <= 0.0 or speed_ratio(self._model, command.q, before.q, time) > self.limits.speed_share:
+            return np.zeros_like(command.q)
+        most = self.limits.speed_share * self._model.speed * time
+        return np.minimum(np.abs(command.q - before.q) + self._calm[held.support] * time, most)
+
+    def _leap(self, held: RobotCommand, command: RobotCommand) -> float:
+        """How far (rad) the joints of the legs that carry are from those of a command."""
+        carrying = self._stance[held.support]
+        return float(np.abs(command.q - held.q)[carrying].max())
+
+    def _touches(self, q: Array, before: Array) -> bool:
+        """Whether the body touches itself at q (J,) rad, and more than at the pose before."""
+        nearest = self._between.nearest(q)
+        return nearest < -self.limits.overlap and nearest < self._between.nearest(before)
 
     def feet(self, q: Array, base_pos: Array, base_quat: Array, support: str) -> Feet:
         """Balance and feet of a pose: q (J,) rad, torso (3,) m, (4,) in the world, on the feet of ``support``."""
@@ -246,9 +277,14 @@ def _kept(command: RobotCommand) -> RobotCommand:
     return replace(command, q=command.q.copy(), base_pos=command.base_pos.copy(), base_quat=command.base_quat.copy())
 
 
-def _instead(taken: Verdict, verdict: Verdict) -> Verdict:
-    """A step taken in place of a command that was refused."""
-    return Verdict(replace(taken.state, newest=verdict.state.newest), taken.accepted, verdict.refusals)
+def _carrying(robot: RobotModel, support: str) -> npt.NDArray[np.bool_]:
+    """Which joints (J,) belong to the legs that carry, or share a motor with one that does."""
+    carrying = np.zeros(len(robot.joint_names), dtype=np.bool_)
+    for chain, carries in zip(("l_leg", "r_leg"), CARRIES[support], strict=True):
+        carrying[list(robot.chains[chain])] = carries
+    for pair in robot.coupled:
+        carrying[list(pair)] = carrying[list(pair)].any()
+    return carrying
 
 
 @njit(cache=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
@@ -18,11 +19,15 @@ from naoimitate.core.frames import RobotCommand
 from naoimitate.human.support import annotate
 from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.hw.none import NoDriver
+from naoimitate.sim.driver import MujocoDriver
+from naoimitate.sim.settings import SimSettings
 
 NAO = load_robot("nao", "v4")
 GATE, LIMITS, DT = CommandGate(NAO), CommandLimits(), 0.01
 BETWEEN = Between(NAO)
 UP = np.array([0.0, 0.0, 1.0])
+PATIENCE = 30
+"""Steps: a third of the second after which a session gives up."""
 
 
 @cache
@@ -38,7 +43,7 @@ def lifted(command: RobotCommand) -> RobotCommand:
     return replace(command, base_pos=command.base_pos + 0.1 * UP)
 
 
-def sent(commands: list[RobotCommand]) -> tuple[list[RobotCommand | None], list[bool]]:
+def sent(commands: Sequence[RobotCommand]) -> tuple[list[RobotCommand | None], list[bool]]:
     """What a robot is given for each command, and whether it is the command itself."""
     state, given_, own = GATE.begin(commands[0].q), [], []
     for command in commands:
@@ -49,14 +54,27 @@ def sent(commands: list[RobotCommand]) -> tuple[list[RobotCommand | None], list[
     return given_, own
 
 
-def assert_safe(commands: list[RobotCommand], fastest: list[float]) -> None:
-    """Every command within the gate's bounds, measured anew, none faster than it may."""
-    for c in commands:
+def assert_safe(commands: list[RobotCommand], given_: list[RobotCommand | None], own: list[bool]) -> None:
+    """Every pose within the gate's bounds, measured anew; a step of catching up no faster than the method and calm."""
+    moved = [c for c in given_ if c is not None]
+    for c in moved:
         feet = GATE.feet(c.q, c.base_pos, c.base_quat, c.support)
         assert feet.margin >= LIMITS.margin and max(feet.off, feet.under) <= LIMITS.height
         assert np.all((c.q >= NAO.lower - 1e-9) & (c.q <= NAO.upper + 1e-9))
-    for (a, b), share in zip(pairwise(commands), fastest, strict=True):
-        assert (np.abs(b.q - a.q) <= share * NAO.speed * min(b.time - a.time, LIMITS.max_dt) * (1.0 + 1e-6)).all()
+    for a, b in pairwise(moved):
+        assert (np.abs(b.q - a.q) <= LIMITS.speed_share * NAO.speed * min(b.time - a.time, LIMITS.max_dt) + 1e-9).all()
+    held = commands[0]
+    for i, (c, itself) in enumerate(zip(given_, own, strict=True)):
+        if c is not None and not itself:
+            share = np.full(len(c.q), LIMITS.catch_up_share)
+            for chain, feet in (("l_leg", "DL"), ("r_leg", "DR")):
+                share[list(NAO.chains[chain])] = LIMITS.stance_share if held.support in feet else LIMITS.catch_up_share
+            share[[NAO.joint("LHipYawPitch"), NAO.joint("RHipYawPitch")]] = LIMITS.stance_share
+            most = np.abs(commands[i].q - commands[i - 1].q) + share * NAO.speed * DT
+            assert (np.abs(c.q - held.q) <= 1.05 * most + 1e-6).all()
+            assert c.support == held.support
+            assert BETWEEN.nearest(c.q) >= -LIMITS.overlap - 1e-9
+        held = held if c is None else c
 
 
 @pytest.mark.parametrize("gap", [1, 5, 10])
@@ -65,30 +83,44 @@ def test_after_a_tenth_of_a_second_of_refusals_the_robot_moves_on_at_once_wherev
     name: str, begin: float, gap: int
 ) -> None:
     """Arms that wave, a leg that swings. Without catching up some of these runs are refused to their end."""
-    commands = run_of(name, begin, begin + 7.0)
-    for k in range(30, 400, 45):
-        given_, own = sent([*commands[:k], *(lifted(c) for c in commands[k : k + gap]), *commands[k + gap :]])
+    commands = list(run_of(name, begin, begin + 7.0))
+    for k in range(30, 550, 26):
+        tried = [*commands[:k], *(lifted(c) for c in commands[k : k + gap]), *commands[k + gap :]]
+        given_, own = sent(tried)
         assert not any(given_[k : k + gap])
-        assert all(given_[k + gap :]), "nothing is held any longer"
-        assert own.index(True, k + gap) - k - gap <= 250, "and soon it is there"
-        assert all(own[k + gap + 250 :])
-        moved = [c for c in given_ if c is not None]
-        mine = [ok for c, ok in zip(given_, own, strict=True) if c is not None]
-        assert_safe(moved, [LIMITS.speed_share if ok else LIMITS.catch_up_share for ok in mine[1:]])
+        for i in range(k + gap, len(commands) - PATIENCE):
+            assert any(given_[i : i + PATIENCE]), "nothing is held for long"
+        if commands[k - 1].support == commands[k + gap].support:
+            assert all(own[k + gap + 120 :]), "and soon the robot is where the method is"
+        assert_safe(commands, given_, own)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(st.sampled_from([("wave", 1.0), ("march", 3.0), ("paper", 5.0)]), st.integers(20, 400), st.integers(1, 150))
 def test_however_long_it_was_held_whatever_the_robot_is_given_is_safe(
     which: tuple[str, float], k: int, gap: int
 ) -> None:
-    commands = run_of(which[0], which[1], which[1] + 7.0)
-    given_, own = sent([*commands[:k], *(lifted(c) for c in commands[k : k + gap]), *commands[k + gap :]])
-    moved = [(c, ok) for c, ok in zip(given_, own, strict=True) if c is not None]
-    assert_safe([c for c, _ in moved], [LIMITS.speed_share if ok else LIMITS.catch_up_share for _, ok in moved[1:]])
-    for c, ok in moved:
-        if not ok:
-            assert BETWEEN.nearest(c.q) >= -LIMITS.overlap - 1e-9
+    commands = list(run_of(which[0], which[1], which[1] + 7.0))
+    assert_safe(commands, *sent([*commands[:k], *(lifted(c) for c in commands[k : k + gap]), *commands[k + gap :]]))
+
+
+def test_a_body_that_was_left_behind_follows_without_tipping() -> None:
+    """Half a second of the weight's way to the other foot is missed; made up for in one leap, the robot falls."""
+    motion, imitator = annotate(load_motion("builtin:march")), Imitator(NAO)
+    imitator.calibrate(motion.tpose)
+    robot = MujocoDriver(NAO, SimSettings(period=0.02), real_time=False)
+    state = None
+    for i in range(250):
+        frame = motion.at(0.02 * i)
+        command = imitator.step(frame, 0.02, support=frame.support)
+        if state is None:
+            state = GATE.begin(command.q)
+            robot._physics.place(command.q, command.base_pos, command.base_quat)
+        tried = lifted(command) if 140 <= i < 165 else command
+        state, accepted, _ = GATE.catch_up(state, tried, 0.02)
+        if accepted is not None:
+            robot.write(accepted)
+        assert not robot.advance(0.02).fell
 
 
 def test_a_jump_is_held_and_not_followed() -> None:
@@ -109,22 +141,19 @@ def test_a_method_that_jumps_and_goes_on_from_there_is_followed_slowly() -> None
         commands.append(replace(command, q=q))
     given_, own = sent(commands)
     assert given_[60] is None
-    assert all(given_[61:])
+    assert all(given_[62:]), "one more look, to see that it was no single jump"
     assert own.index(True, 61) > 61 + 0.5 * 1.0 / (LIMITS.catch_up_share * NAO.speed[0] * DT)
     assert own[-1]
 
 
-def test_other_feet_than_those_held_are_not_caught_up_with() -> None:
-    commands = run_of("paper", 5.0, 12.0)
+def test_a_foot_that_the_method_lifted_meanwhile_stays_down_until_it_is_down_again() -> None:
+    commands = list(run_of("march", 3.0, 9.0))
     lift = next(i for i, c in enumerate(commands) if c.support == "L")
-    held, late = commands[:lift], commands[lift + 100]
-    state = GATE.begin(held[0].q)
-    for command in held:
-        state = GATE.catch_up(state, command, DT).state
-    for command in (lifted(commands[lift + 99]), late):
-        state, accepted, why = GATE.catch_up(state, command, 1.0)
-    assert accepted is None
-    assert Refusal.SPEED in why
+    down = next(i for i in range(lift, len(commands)) if commands[i].support == "D")
+    given_, own = sent([*commands[:lift], *(lifted(c) for c in commands[lift : lift + 100]), *commands[lift + 100 :]])
+    assert all(c.support == "D" for c in given_ if c is not None)
+    assert_safe(commands, given_, own)
+    assert all(own[down + 100 :])
 
 
 def test_a_joint_that_turns_round_too_fast_is_not_caught_up_with_in_the_same_step() -> None:
