@@ -49,13 +49,18 @@ class Rig:
 
 @contextmanager
 def rig(
-    robot: RobotModel, *faults: str, settings: CanSettings = QUICK, stub_robot: RobotModel | None = None, **options: Any
+    robot: RobotModel,
+    *faults: str,
+    settings: CanSettings = QUICK,
+    stub_robot: RobotModel | None = None,
+    posture: str = "stand",
+    **options: Any,
 ) -> Iterator[Rig]:
-    """A driver that is not connected yet, and motors that answer; stub_robot: what the motors believe to be."""
+    """A driver that is not connected yet, and motors that answer in a posture; stub_robot: what they believe to be."""
     channel = f"rig{next(_CHANNELS)}"
     believed = stub_robot or robot
     bus, witness = (can.Bus(interface="virtual", channel=channel) for _ in range(2))
-    stub = CanStub(believed, bus, [parse_fault(text, motor_numbers(believed)) for text in faults])
+    stub = CanStub(believed, bus, [parse_fault(text, motor_numbers(believed)) for text in faults], posture=posture)
     seen = can.BufferedReader()
     notifier = can.Notifier(witness, [seen], timeout=0.05)
     driver = CanDriver(robot, interface="virtual", channel=channel, settings=settings, **options)

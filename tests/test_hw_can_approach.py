@@ -28,13 +28,6 @@ BRISK = replace(QUICK, approach=2.0)
 """So that the tests do not take the time that a robot does."""
 
 
-def put(it: Rig, robot: RobotModel, q: Array) -> None:
-    """Place the motors at a posture, hands half open."""
-    joints = read_joint_map(robot)
-    for node, angle in zip(joints.nodes, joints.gather(q, np.full(2, 0.5)), strict=True):
-        it.stub.motors[node].position = float(angle)
-
-
 def paths(it: Rig, key: str = "position") -> dict[int, Array]:
     """What each motor was sent, in order."""
     sent: dict[int, list[float]] = {node: [] for node in it.stub.motors}
@@ -74,8 +67,7 @@ def test_a_way_is_straight_within_its_speed_and_ends_at_rest_where_it_should(
 @pytest.mark.parametrize("posture", ["Crouch", "zero"])
 def test_from_a_crouch_and_from_zero_it_comes_to_the_stand(nao: RobotModel, posture: str) -> None:
     said: list[str] = []
-    with rig(nao, settings=BRISK, compensation=False, notice=said.append) as it:
-        put(it, nao, nao.postures[posture])
+    with rig(nao, settings=BRISK, compensation=False, notice=said.append, posture=posture) as it:
         it.driver.connect()
         q, stand = it.driver.read().q, nao.postures["stand"]
         assert np.abs(q - stand).max() < 0.05, "at the end its newest answers may be a period old"
@@ -83,8 +75,8 @@ def test_from_a_crouch_and_from_zero_it_comes_to_the_stand(nao: RobotModel, post
         sent = paths(it)
     assert said == ["moving to the stand posture within 2 s: hold the robot"]
     joints = read_joint_map(nao)
-    start = joints.gather(nao.postures[posture], np.full(2, 0.5))
-    goal = joints.gather(stand, np.full(2, 0.5))
+    start = joints.gather(nao.postures[posture], np.zeros(2))
+    goal = joints.gather(stand, np.zeros(2))
     longest = max(sent.values(), key=np.ptp)
     for motor, node in enumerate(joints.nodes):
         path = sent[node]
@@ -130,8 +122,9 @@ def test_the_way_usually_takes_its_time() -> None:
 
 
 def test_a_motor_that_is_stuck_is_named_and_the_robot_let_go_of(nao: RobotModel) -> None:
-    with rig(nao, "LKneePitch:stuck@0", "RHipPitch:stuck@0", settings=BRISK, compensation=False) as it:
-        put(it, nao, nao.postures["Crouch"])
+    with rig(
+        nao, "LKneePitch:stuck@0", "RHipPitch:stuck@0", settings=BRISK, compensation=False, posture="Crouch"
+    ) as it:
         with pytest.raises(DriverError, match=r"motor 11 \(LKneePitch\).*motor 15 \(RHipPitch\)") as error:
             it.driver.connect()
         assert "\n" not in str(error.value) and "HeadYaw" not in str(error.value)
@@ -142,8 +135,7 @@ def test_a_motor_that_is_stuck_is_named_and_the_robot_let_go_of(nao: RobotModel)
 @pytest.mark.parametrize("moment", [0.02, 0.5])
 def test_stop_from_another_thread_ends_the_way_at_once(nao: RobotModel, moment: float) -> None:
     """While the motors are being found, and on the way."""
-    with rig(nao, settings=replace(QUICK, approach=0.3), compensation=False) as it:
-        put(it, nao, nao.postures["Crouch"])
+    with rig(nao, settings=replace(QUICK, approach=0.3), compensation=False, posture="Crouch") as it:
         begin = time.monotonic()
         with after(moment, it.driver.stop), pytest.raises(DriverError, match="stopped while the robot was being"):
             it.driver.connect()
@@ -152,8 +144,7 @@ def test_stop_from_another_thread_ends_the_way_at_once(nao: RobotModel, moment: 
 
 
 def test_the_emergency_stop_on_the_way_stops_every_motor_within_a_period(nao: RobotModel) -> None:
-    with rig(nao, settings=replace(QUICK, approach=1.0, ramp=0.3), compensation=False) as it:
-        put(it, nao, nao.postures["Crouch"])
+    with rig(nao, settings=replace(QUICK, approach=1.0, ramp=0.3), compensation=False, posture="Crouch") as it:
         pressed: list[float] = []
 
         def press() -> None:
@@ -170,8 +161,7 @@ def test_the_emergency_stop_on_the_way_stops_every_motor_within_a_period(nao: Ro
 
 def test_a_signal_handler_may_stop_the_way(nao: RobotModel) -> None:
     """It runs in the thread that waits for the robot to arrive."""
-    with rig(nao, settings=replace(QUICK, approach=0.3), compensation=False) as it:
-        put(it, nao, nao.postures["Crouch"])
+    with rig(nao, settings=replace(QUICK, approach=0.3), compensation=False, posture="Crouch") as it:
         for stop in (it.driver.stop, it.driver.emergency_stop):
             before = signal.signal(signal.SIGUSR1, lambda *_, stop=stop: stop())
             try:

@@ -191,6 +191,7 @@ def test_an_interrupted_command_leaves_without_a_traceback(tmp_path: Path) -> No
     ("arguments", "message"),
     [
         (["--fault", "HeadYaw:lazy@1"], "unknown kind 'lazy'"),
+        (["--posture", "handstand"], "nao has no posture 'handstand': give one of zero, stand"),
         (["--interface", "nonsense"], "no CAN interface 'nonsense'"),
         (["--database", "/nowhere/can.dbc"], "there is no CAN database /nowhere/can.dbc"),
     ],

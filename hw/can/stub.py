@@ -33,14 +33,19 @@ ERROR_FRAMES = 16
 class CanStub:
     """The motors of a robot on a bus that is already open; it runs in a thread between ``start`` and ``stop``.
 
-    database: DBC file, None = the robot's own. faults: what shall go wrong, and when. The robot stands in its posture
-    ``stand``; ``motors`` are the simulated motors by number.
+    database: DBC file, None = the robot's own. faults: what shall go wrong, and when. posture: of the robot, by name,
+    in which the motors are found. ``motors`` are the simulated motors by number.
     """
 
     def __init__(
-        self, robot: RobotModel, bus: can.BusABC, faults: Iterable[StubFault] = (), database: Path | None = None
+        self,
+        robot: RobotModel,
+        bus: can.BusABC,
+        faults: Iterable[StubFault] = (),
+        database: Path | None = None,
+        posture: str = "stand",
     ) -> None:
-        self.motors = _motors(robot)
+        self.motors = _motors(robot, posture)
         for fault in faults:
             self.motors[fault.node].faults.append(fault)
         self.damaged = 0
@@ -163,17 +168,19 @@ def motor_numbers(robot: RobotModel) -> dict[str, int]:
     return {name: int(entry["id"]) for part in ("joints", "hands") for name, entry in section.get(part, {}).items()}
 
 
-def _motors(robot: RobotModel) -> dict[int, StubMotor]:
-    """Motors by number that hold the robot's stand, hands closed."""
+def _motors(robot: RobotModel, posture: str) -> dict[int, StubMotor]:
+    """Motors by number in a posture of the robot, hands closed."""
     motor_numbers(robot)
+    if posture not in robot.postures:
+        raise DriverError(f"{robot.name} has no posture {posture!r}: give one of {', '.join(robot.postures)}")
     section = robot.data["can"]
-    stand = dict(zip(robot.joint_names, robot.postures["stand"], strict=True))
+    start = dict(zip(robot.joint_names, robot.postures[posture], strict=True))
     speed = dict(zip(robot.joint_names, robot.speed, strict=True))
     motors = {}
     for name, own in {**section["joints"], **section.get("hands", {})}.items():
         entry = {"sign": 1, "gear": 1.0, "zero": 0.0, **section.get("defaults", {}), **own}
         ratio = entry["sign"] * entry["gear"]
-        angle = ratio * (float(stand.get(name, 0.0)) - entry["zero"])
+        angle = ratio * (float(start.get(name, 0.0)) - entry["zero"])
         motors[int(entry["id"])] = StubMotor(angle, abs(ratio) * float(speed.get(name, 5.0)))
     return motors
 

@@ -25,6 +25,7 @@ PIECE = 0.2
     help="NODE: a motor's number or joint; KIND: stuck, silent, crc, hot or bus-off; SECONDS after the start.",
 )
 @click.option("--database", type=click.Path(path_type=Path, dir_okay=False), help="DBC file, not the robot's own.")
+@click.option("--posture", default="stand", show_default=True, help="In which the robot is found, such as Crouch.")
 @click.option("--duration", type=click.FloatRange(min=0.0), help="s to run; until Ctrl-C otherwise.")
 def can_stub(
     robot: str,
@@ -33,6 +34,7 @@ def can_stub(
     channel: str,
     faults: tuple[str, ...],
     database: Path | None,
+    posture: str,
     duration: float | None,
 ) -> None:
     """Simulate a robot's motors on a CAN bus.
@@ -48,7 +50,7 @@ def can_stub(
     wanted = [parse_fault(text, motor_numbers(model)) for text in faults]
     bus = open_bus(interface, channel, int(model.data["can"].get("bitrate", 1_000_000)))
     with bus:
-        stub = CanStub(model, bus, wanted, database)
+        stub = CanStub(model, bus, wanted, database, posture)
         stub.start()
         try:
             click.echo(f"ready: {len(stub.motors)} motors of {model.name} on {interface} {channel}")
