@@ -30,6 +30,7 @@ class GravityCompensation:
         self._feet = np.array([robot.points[f"{side}_sole"].joint for side in SIDES])
         self.sole_offset = np.array([_sole_centre(robot, side) for side in SIDES])
         self._sole = np.zeros((2, 3))
+        self.torque(robot.postures["stand"], np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles: no command waits for it
 
     def torque(self, q: Array, base_quat: Array, support: str) -> Array:
         """Torque (J,) N m that holds the posture still, clipped to the motors' limits.

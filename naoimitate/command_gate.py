@@ -89,9 +89,14 @@ class CommandGate:
             support: robot.speed * np.where(carrying, limits.stance_share, limits.catch_up_share)
             for support, carrying in self._stance.items()
         }
-        stand = robot.postures["stand"]
-        self.feet(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles, so that no command waits for it
+        self._warm_up(robot.postures["stand"])
+
+    def _warm_up(self, stand: Array) -> None:
+        """Compile everything, so that no command waits for it."""
+        feet = self.feet(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")
+        _slip(self._legs, feet.pos, feet.rot, feet)
         _motion(self._model, stand, stand, np.zeros_like(stand), 1.0)
+        range_excess(self._model, stand)
         self._between.nearest(stand)
 
     def begin(self, q: Array) -> GateState:

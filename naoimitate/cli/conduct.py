@@ -80,7 +80,7 @@ def _run(rig: Rig, loop: Loop, turns: Iterator[Turn], duration: float) -> None:
 
     with listening() as keys:
         if not keys:
-            loop.watch.append(Notices(rig.feed).take)
+            loop.watch.append(Notices(rig.feed, rig.session).take)
             loop.run(turns, duration)
             return
         with Panel(rig.session, rig.feed.stream, rig.driver, rig.gate) as panel:
@@ -91,12 +91,16 @@ def _run(rig: Rig, loop: Loop, turns: Iterator[Turn], duration: float) -> None:
 class Notices:
     """Tells on standard error, a line each, what an operator without a panel has to know: states and troubles."""
 
-    def __init__(self, feed: Feed) -> None:
-        self._feed, self._said, self._begin = feed, "", time.monotonic()
+    def __init__(self, feed: Feed, session: Session) -> None:
+        self._feed, self._session, self._said, self._begin = feed, session, "", time.monotonic()
 
     def take(self, beat: Beat) -> None:
         """One turn of the loop."""
+        from naoimitate.fsm.session import State
+
         state = beat.tick.state.value
+        if beat.tick.state is State.FAULT:
+            state += f": {self._session.reason}"
         if time.monotonic() - self._begin > PATIENCE and not self._feed.stream.counts.frames:
             state = self._feed.stream.complaint() or f"nothing comes: still {self._feed.ready}"
         if state != self._said:

@@ -17,7 +17,7 @@ from naoimitate.live.stream import Stream
 SHORTEST = 0.002
 """[s] between two steps: a frame that comes sooner waits so long."""
 REFUSED = 1.0
-"""[s] without a command that passes the gate, after which the session is in fault."""
+"""[s] in which the gate refuses every command, after which the session is in fault."""
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,14 @@ class Loop:
     session: Session
     driver: GuardedDriver
     watch: list[Callable[[Beat], None]] = field(default_factory=list)
+    _refused_since: float = field(default=math.nan, init=False)
 
     def run(self, turns: Iterator[Turn], duration: float = math.inf, ended: Callable[[], bool] = lambda: False) -> None:
         """Run for ``duration`` s, until ``ended``, or until there are no more turns.
 
         The driver is connected before, and left connected.
         """
-        begin = math.nan
+        begin, self._refused_since = math.nan, math.nan
         for turn in turns:
             begin = turn.now if math.isnan(begin) else begin
             self._beat(turn)
@@ -87,17 +88,21 @@ class Loop:
         if turn.tick.state is not State.FAULT:
             self.driver.write(turn.tick.command)
             gate, hand_over = self.driver.delays
-            self._look_after(self.driver.status)
+            self._look_after(self.driver.status, turn.now)
         latency = time.monotonic() - turn.arrival if turn.tick.fresh else math.nan
         beat = Beat(turn, latency, gate, hand_over)
         for watcher in self.watch:
             watcher(beat)
 
-    def _look_after(self, status: GuardStatus) -> None:
+    def _look_after(self, status: GuardStatus, now: float) -> None:
         """Tell the session of a robot that does not follow any more, and let go of it."""
+        if not status.refusing:
+            self._refused_since = math.nan
+        elif math.isnan(self._refused_since):
+            self._refused_since = now
         if status.condition is not Condition.LIVE:
             self.session.tell(Event.FAULT, status.problem or status.condition.value)
-        elif status.held > REFUSED:
+        elif now - self._refused_since > REFUSED:
             self.session.tell(Event.FAULT, f"commands are refused: {', '.join(status.refusing)}")
             self.driver.emergency_stop()
 
