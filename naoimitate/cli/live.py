@@ -116,7 +116,7 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
         from naoimitate.hw.can import CanDriver
 
         names = {key: options[f"can_{key}"] for key in ("interface", "channel", "codec")}
-        return CanDriver(robot, **names)
+        return CanDriver(robot, **names, notice=click.echo)
     if options["driver"] == "naoqi":
         from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings
 

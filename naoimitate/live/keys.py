@@ -64,6 +64,7 @@ def obey(keys: str, session: Session, driver: GuardedDriver) -> bool:
 
 def _reset(session: Session, driver: GuardedDriver) -> None:
     """Connect again; a robot that cannot be is still in fault, for the reason that the panel shows."""
+    session.reason = "hold the robot: it is let down, and stands up again"
     try:
         driver.reset()
         driver.connect()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from naoimitate.core.errors import DriverError
 from naoimitate.fsm.session import Event, State
 from naoimitate.hw.condition import Condition, GuardStatus
 from naoimitate.hw.guarded import GuardedDriver
@@ -85,7 +87,10 @@ class Loop:
     def _beat(self, turn: Turn) -> None:
         """Hand a turn's command over; a fault moves nothing."""
         gate = hand_over = 0.0
-        if turn.tick.state is not State.FAULT:
+        if turn.tick.state is State.FAULT:
+            with contextlib.suppress(DriverError):  # a robot that holds its pose may still fall: the guard watches
+                self.driver.read()
+        else:
             self.driver.write(turn.tick.command)
             gate, hand_over = self.driver.delays
             self._look_after(self.driver.status, turn.now)

@@ -124,7 +124,7 @@ def finish(out: Path) -> Run | None:
         return None
     values = {key: np.concatenate([frame[key] for frame in frames]) for key in frames[0]}
     if "sim_fell" in values:
-        values["sim_fell"] = values["sim_fell"].any()
+        values["sim_fell"] = np.asarray(values["sim_fell"].any())
     run = Run(**{key: value.item() if value.ndim == 0 else value for key, value in {**constants, **values}.items()})
     save(run, out)
     os.unlink(path)
