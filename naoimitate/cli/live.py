@@ -46,7 +46,7 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 @click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the raw stream to this file.")
 @click.option("--out", type=types.RUN_FILE, help="Run file to write.")
 @click.pass_context
-def live(context: click.Context, **options: Any) -> None:
+def live(context: click.Context, /, **options: Any) -> None:
     """Let a robot follow a person whose motion capture comes over the network.
 
     Stand in a T-pose and hold it until the robot begins to follow. Ctrl-C ends the session safely.
