@@ -65,14 +65,17 @@ def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjS
 
 def torque_limits(robot: RobotModel, settings: SimSettings) -> Array:
     """Limits (J,) N m of the servos' torque, after ``settings.torque_limit``."""
-    if settings.torque_limit == "effort":
-        return robot.effort
+    limit = settings.torque_limit
+    share = {"effort": 0.0, "stall": 1.0}[limit] if isinstance(limit, str) else limit
+    if share <= 0.0:
+        return robot.effort * (1.0 + share)
     stall = robot.data.get("stall_torque") or {}
     if missing := [name for name in robot.joint_names if name not in stall]:
         raise RobotModelError(
             f"{robot.name} states no stall_torque for {missing[0]}; simulate it with torque_limit='effort'"
         )
-    return np.array([stall[name] for name in robot.joint_names])
+    ceiling = np.array([stall[name] for name in robot.joint_names])
+    return np.asarray((1.0 - share) * robot.effort + share * ceiling)
 
 
 def _bodies(spec: mujoco.MjSpec, robot: RobotModel) -> dict[int, Any]:

@@ -36,6 +36,8 @@ class Physics:
         self._all_servos = np.concatenate([self._servos, self._hands.servos])
         self._fsr = np.array([[self._sensor(f"{side}_fsr_{name}") for name in FSR_NAMES] for side in SIDES])
         self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
+        self.torso = int(self.model.jnt_bodyid[self.model.joint("base").id])
+        """Index of the torso's body."""
         self._plates = np.array([self.model.body(plate_name(side)).id for side in SIDES])
         mujoco.mj_forward(self.model, self.data)
         self._gain, self._bias = self.model.actuator_gainprm.copy(), self.model.actuator_biasprm.copy()
@@ -48,8 +50,8 @@ class Physics:
     @property
     def weight(self) -> float:
         """N, of the robot."""
-        mass = self.model.body_subtreemass[self.model.jnt_bodyid[self.model.joint("base").id]]
-        return float(mass * -self.model.opt.gravity[2])
+        mass = self.model.body_subtreemass[self.torso]
+        return float(mass * np.linalg.norm(self.model.opt.gravity))
 
     def place(self, q: Array, base_pos: Array, base_quat: Array, opening: Array = CLOSED) -> None:
         """Put the robot at rest into a posture, servos commanded to stay there; q (J,) rad, pos (3,) m, quat (4,).
@@ -67,6 +69,10 @@ class Physics:
         """Servos with a share, 0 to 1, of their stiffness and damping."""
         self.model.actuator_gainprm[:] = share * self._gain
         self.model.actuator_biasprm[:] = share * self._bias
+
+    def push(self, force: Array) -> None:
+        """Push the torso's centre of mass with a force (3,) N in the world, until told otherwise."""
+        self.data.xfrc_applied[self.torso, :3] = force
 
     def advance(self, command: Array, duration: float, opening: Array | None = None) -> None:
         """Let ``duration`` (s) pass while the servo commands move in a straight line to ``command`` (J,) rad.
@@ -137,9 +143,9 @@ class Physics:
     def center_of_pressure(self) -> Array | None:
         """Where the floor's force on the soles acts, (2,) m in the world; None while nothing is on the floor."""
         total, moment, force = 0.0, np.zeros(2), np.zeros(6)
-        for index, contact in enumerate(self.data.contact):
-            if any(self.model.geom_bodyid[geom] in self._plates for geom in contact.geom):
-                mujoco.mj_contactForce(self.model, self.data, index, force)
-                total += force[NORMAL]
-                moment += force[NORMAL] * contact.pos[:2]
+        bodies, places = self.model.geom_bodyid[self.data.contact.geom], self.data.contact.pos
+        for index in np.flatnonzero(np.isin(bodies, self._plates).any(axis=1)):
+            mujoco.mj_contactForce(self.model, self.data, index, force)
+            total += force[NORMAL]
+            moment += force[NORMAL] * places[index, :2]
         return moment / total if total > 0.0 else None

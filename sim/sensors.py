@@ -19,6 +19,8 @@ SENSOR_GROUP = 4
 FSR_KEYS = ("FrontLeft", "FrontRight", "RearLeft", "RearRight")
 """Names in the robot's data, in the order of ``FSR_NAMES``."""
 
+Z_AXIS = np.array([0.0, 0.0, 1.0])
+
 FSR_REACH = 0.3
 """How far a force sensor's quarter of the sole reaches out from the split, m: beyond any foot."""
 
@@ -78,11 +80,13 @@ def _looking_along_x(pitch: float) -> Array:
     return np.array([[0.0, s, -c], [-1.0, 0.0, 0.0], [0.0, c, s]])
 
 
-def roll_pitch(quat: Array) -> Array:
+def roll_pitch(quat: Array, up: Array = Z_AXIS) -> Array:
     """Roll and pitch (2,) rad of a torso, as an inertial board gives them: from the direction of gravity alone.
 
-    R = Rz(yaw) Ry(pitch) Rx(roll); the last row of R is (-sin p, cos p sin r, cos p cos r).
+    up: (3,) the vertical, where it is not the world's z. R = Rz(yaw) Ry(pitch) Rx(roll); the vertical in torso axes,
+    the last row of R, is (-sin p, cos p sin r, cos p cos r).
     """
-    w, x, y, z = quat
-    down = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
-    return np.array([math.atan2(down[1], down[2]), math.asin(min(max(-down[0], -1.0), 1.0))])
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quat)
+    vertical = up @ matrix.reshape(3, 3)
+    return np.array([math.atan2(vertical[1], vertical[2]), math.asin(min(max(-vertical[0], -1.0), 1.0))])

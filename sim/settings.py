@@ -20,8 +20,9 @@ class SimSettings:
     moving command by the same time and the posture stays coordinated. Limbs are overdamped with it, and the whole
     robot swaying on one foot has about a fifth of critical damping."""
 
-    torque_limit: Literal["effort", "stall"] = "effort"
-    """``effort``: the robot's planning limit (URDF). ``stall``: the motors' physical ceiling, where its data say it."""
+    torque_limit: Literal["effort", "stall"] | float = "effort"
+    """``effort``: the robot's planning limit (URDF). ``stall``: the motors' physical ceiling, where its data say it.
+    A number: from 0, effort, to 1, stall; below 0 the share of the effort that is missing."""
 
     armature: float = 0.008
     """Inertia of rotor and gears seen at the joint, kg m^2. A coreless 22 mm motor has a rotor of about 4e-7 kg m^2;

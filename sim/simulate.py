@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from naoimitate.core.falling import has_fallen, swing_load, tilt
+from naoimitate.core.falling import has_fallen, has_tipped, swing_load, tilt
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.geometry import convex_hull, polygon_margin
 from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.driver import RobotState
 from naoimitate.robot.model import RobotModel
+from naoimitate.sim.disturbance import Disturbance, disturb_model, disturbed_settings
+from naoimitate.sim.disturbance_line import CommandLine
+from naoimitate.sim.disturbance_sensors import NoisySensors
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.settings import SimSettings
 
@@ -20,6 +25,20 @@ DEFAULT = SimSettings()
 
 SETTLE_TIME = 1.0
 """How long the robot stands in its first pose before the motion starts, s: servos and soles reach equilibrium."""
+
+
+class Target(NamedTuple):
+    """One frame of a plan, as a ``RobotCommand`` has it: q (J,) rad, torso (3,) m and (4,), support."""
+
+    q: Array
+    base_pos: Array
+    base_quat: Array
+    support: str
+
+
+Control = Callable[[Target, RobotState], Array]
+"""Turns a frame of the plan and what the robot measures at that moment into servo angles (J,) rad: the place of
+gravity compensation, and of a loop that is closed over the sensors."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +85,9 @@ def simulate(
     compensation: bool = True,
     settings: SimSettings = DEFAULT,
     progress: Callable[[float], None] | None = None,
+    disturbance: Disturbance | None = None,
+    control: Control | None = None,
+    until_tipped: bool = False,
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
 
@@ -73,27 +95,61 @@ def simulate(
     stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's gravity compensation.
     progress: told the share that is done. Each frame's command is under way from the time of the frame before, and is
     due at its own.
+    disturbance: how the robot, its servos and its world really are, in place of the settings; the plan and the driver
+    do not know it (``stiffness`` is then what the driver takes the servos for). control: stands in for compensation.
+    until_tipped: end with the frame in which the torso tips.
     """
-    physics = Physics(robot, replace(settings, stiffness=stiffness))
-    commands = q
-    if compensation:
-        gravity = GravityCompensation(robot)
-        commands = np.array(
-            [gravity.command(*frame, stiffness) for frame in zip(q, base_quat, support, strict=True)]
-        )  # fmt: skip
+    plan = [Target(*frame) for frame in zip(q, base_pos, base_quat, support.tolist(), strict=True)]
     openings = np.full((len(time), 2), np.nan) if hand_opening is None else hand_opening
-    physics.place(q[0], base_pos[0], base_quat[0], openings[0])
+    if disturbance is None:
+        disturbance, settings = Disturbance(), replace(settings, stiffness=stiffness)
+    else:
+        settings = disturbed_settings(settings, disturbance)
+    physics = Physics(robot, settings)
+    disturb_model(physics.model, physics.data, physics.torso, disturbance)
+    physics.place(*plan[0][:3], openings[0])
+    control = control or driver_control(robot, stiffness, compensation=compensation)
     samples = []
-    for command, due, mode, opening in zip(commands, time - time[0] + SETTLE_TIME, support, openings, strict=True):
-        physics.advance(command, float(due) - physics.time, opening)
-        samples.append(_sample(robot, physics, str(mode)))
+    for target in _play(physics, plan, time - time[0], openings, disturbance, control):
+        samples.append(_sample(robot, physics, target.support))
         if progress is not None:
             progress(len(samples) / len(time))
+        if until_tipped and _tipped(physics, target):
+            break
+    count = len(samples)
     sim_q, sim_pos, sim_quat, load, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
-    lean, height = tilt(base_quat, sim_quat), sim_pos[:, 2] / base_pos[:, 2]
-    swing = swing_load(support, load, physics.weight)
+    lean, height = tilt(base_quat[:count], sim_quat), sim_pos[:, 2] / base_pos[:count, 2]
+    swing = swing_load(support[:count], load, physics.weight)
     fell = has_fallen(lean, height, swing)
-    return SimResult(time, sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
+    return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
+
+
+def driver_control(robot: RobotModel, stiffness: float, *, compensation: bool = True) -> Control:
+    """What the driver does to a frame: gravity compensation for the robot as its model says, or nothing."""
+    if not compensation:
+        return lambda target, state: target.q
+    gravity = GravityCompensation(robot)
+    return lambda target, state: gravity.command(target.q, target.base_quat, target.support, stiffness)
+
+
+def _play(
+    physics: Physics, plan: list[Target], moments: Array, openings: Array, disturbance: Disturbance, control: Control
+) -> Iterator[Target]:
+    """Let time pass up to each frame of a plan in turn; moments: (T,) s from the first frame."""
+    sensors = NoisySensors(physics, disturbance)
+    duration = float(moments[-1])
+    line = CommandLine(disturbance.delay, disturbance.drop_at * duration, disturbance.drop_time)
+    for target, moment, opening in zip(plan, moments.tolist(), openings, strict=True):
+        servos = line.through(moment, control(target, sensors.read(target.base_pos, target.base_quat)))
+        now, due = physics.time, moment + SETTLE_TIME
+        physics.push(disturbance.push_force(now - SETTLE_TIME, due - SETTLE_TIME, duration))
+        physics.advance(servos, due - now, opening)
+        yield target
+
+
+def _tipped(physics: Physics, target: Target) -> bool:
+    height = physics.base_pos[2] / target.base_pos[2]
+    return bool(has_tipped(tilt(target.base_quat, physics.base_quat), height))
 
 
 def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float, Array]:
