@@ -13,6 +13,7 @@ from naoimitate.run.similarity import similarity
 from naoimitate.run.stability import stability
 from naoimitate.run.support import support
 from naoimitate.run.survival import survival
+from naoimitate.run.zmp import zmp
 
 
 def score_run(run: Run, robot: RobotModel) -> list[Measure]:
@@ -23,6 +24,7 @@ def score_run(run: Run, robot: RobotModel) -> list[Measure]:
     at, between = frames(run, robot), midpoints(run, robot)
     return [
         *stability(run, at, between),
+        *zmp(run, robot, at),
         *contact(run, robot, at),
         *limits(run, robot),
         *overlap(robot, at),
