@@ -23,6 +23,7 @@ from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
 from naoimitate.cli.score import score
 from naoimitate.cli.stream import stream
+from naoimitate.cli.stress import stress
 from naoimitate.core.errors import NaoimitateError
 
 MISTAKE = 2
@@ -41,7 +42,7 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    demo, imitate, live, stream, score, check, calibrate, motions, robots, recover, reproduce, can_stub,
+    demo, imitate, live, stream, score, check, calibrate, motions, robots, recover, reproduce, stress, can_stub,
 ):  # fmt: skip
     cli.add_command(_command)
 
