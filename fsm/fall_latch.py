@@ -1,7 +1,8 @@
-"""The fall latch: a robot that falls is made soft at once, then let go of, and stays so until a person resets it.
+"""The fall latch: a robot that falls is made soft at once, then let go of; nothing that it senses leads out of that.
 
-Pure and driven by its edge table: no arrays, no clock. A fall is told from how far the torso leans away from where it
-was told to be, not from the vertical: a robot that bows on purpose does not fall.
+Pure and driven by its edge table: no arrays, no clock; one latch for each connection. A fall is told from how far the
+torso leans away from where it was told to be, not from the vertical: a robot that bows on purpose does not fall. One
+that measures neither its torso nor its fall is never seen to fall.
 """
 
 from __future__ import annotations
@@ -22,16 +23,7 @@ class Fall(enum.Enum):
     FALLING = "falling"
     """Believed: the servos are soft, so that nothing breaks."""
     FALLEN = "fallen"
-    """It lies, or has had the time to: let go of. Only a person's reset leads out."""
-
-
-class Event(enum.Enum):
-    """What the machine is told."""
-
-    SENSED = "sensed"
-    """The robot's senses were read."""
-    RESET = "reset"
-    """A person has put the robot on its feet and says so."""
+    """It lies, or has had the time to: let go of. No edge leads out."""
 
 
 class Action(enum.Enum):
@@ -42,8 +34,6 @@ class Action(enum.Enum):
     """Lower the stiffness at once."""
     STOP = "stop"
     """End the motion and let go of the robot."""
-    RELEASE = "release"
-    """Commands may pass again, after a new connection."""
 
 
 @dataclass(frozen=True)
@@ -82,11 +72,6 @@ class Senses:
 Guard = Callable[[Senses, FallLimits], bool]
 
 
-def always(senses: Senses, limits: FallLimits) -> bool:
-    """No condition."""
-    return True
-
-
 def fell(senses: Senses, limits: FallLimits) -> bool:
     """The robot says that it has fallen."""
     return senses.fell
@@ -114,32 +99,30 @@ def time_is_up(senses: Senses, limits: FallLimits) -> bool:
 
 
 class Edge(NamedTuple):
-    """One transition: in ``state``, on ``event``, where ``guard`` holds, do ``action`` and be in ``next``."""
+    """One transition: in ``state``, where ``guard`` holds for what is sensed, do ``action`` and be in ``next``."""
 
     state: Fall
-    event: Event
     guard: Guard
     action: Action
     next: Fall
 
 
 EDGES = (
-    Edge(Fall.UPRIGHT, Event.SENSED, fell, Action.SOFTEN, Fall.FALLING),
-    Edge(Fall.UPRIGHT, Event.SENSED, leans, Action.NONE, Fall.LEANING),
-    Edge(Fall.LEANING, Event.SENSED, fell, Action.SOFTEN, Fall.FALLING),
-    Edge(Fall.LEANING, Event.SENSED, leans_long, Action.SOFTEN, Fall.FALLING),
-    Edge(Fall.LEANING, Event.SENSED, upright, Action.NONE, Fall.UPRIGHT),
-    Edge(Fall.FALLING, Event.SENSED, fell, Action.STOP, Fall.FALLEN),
-    Edge(Fall.FALLING, Event.SENSED, time_is_up, Action.STOP, Fall.FALLEN),
-    Edge(Fall.FALLEN, Event.RESET, always, Action.RELEASE, Fall.UPRIGHT),
+    Edge(Fall.UPRIGHT, fell, Action.SOFTEN, Fall.FALLING),
+    Edge(Fall.UPRIGHT, leans, Action.NONE, Fall.LEANING),
+    Edge(Fall.LEANING, fell, Action.SOFTEN, Fall.FALLING),
+    Edge(Fall.LEANING, leans_long, Action.SOFTEN, Fall.FALLING),
+    Edge(Fall.LEANING, upright, Action.NONE, Fall.UPRIGHT),
+    Edge(Fall.FALLING, fell, Action.STOP, Fall.FALLEN),
+    Edge(Fall.FALLING, time_is_up, Action.STOP, Fall.FALLEN),
 )
 """The whole machine. The first edge that fits is taken; where none does, the state stays."""
 
 
-def take(state: Fall, event: Event, senses: Senses, limits: FallLimits) -> tuple[Fall, Action]:
+def take(state: Fall, senses: Senses, limits: FallLimits) -> tuple[Fall, Action]:
     """One transition: the next state and what to do."""
     for edge in EDGES:
-        if edge.state is state and edge.event is event and edge.guard(senses, limits):
+        if edge.state is state and edge.guard(senses, limits):
             return edge.next, edge.action
     return state, Action.NONE
 
@@ -155,19 +138,7 @@ class FallLatch:
     def sense(self, lean: float, rate: float, fell: bool, dt: float) -> Action:
         """Look at the senses dt s after the last time."""
         self._lasted += dt
-        return self._go(Event.SENSED, Senses(lean, rate, fell, self._lasted))
-
-    def reset(self) -> Action:
-        """A person says that the robot stands again; ignored while it falls."""
-        return self._go(Event.RESET, Senses(lasted=self._lasted))
-
-    @property
-    def tripped(self) -> bool:
-        """Whether no command may pass."""
-        return self.state in (Fall.FALLING, Fall.FALLEN)
-
-    def _go(self, event: Event, senses: Senses) -> Action:
-        state, action = take(self.state, event, senses, self.limits)
+        state, action = take(self.state, Senses(lean, rate, fell, self._lasted), self.limits)
         if state is not self.state:
             self.state, self._lasted = state, 0.0
         return action
