@@ -35,16 +35,12 @@ def sweep(
     """
     boundaries: list[Boundary] = []
     for number, levels in enumerate(kind.outward):
-        done = number / len(kind.outward)
-        boundaries += _one_way(
-            pool,
-            kind,
-            levels,
-            range(plans),
-            seed,
-            cases or kind.variants,
-            lambda share, done=done: told(done + share / len(kind.outward)),
-        )
+
+        def on_the_way(share: float, number: int = number) -> None:
+            told((number + share) / len(kind.outward))
+
+        trials = cases or kind.variants
+        boundaries += _one_way(pool, kind, levels, range(plans), seed, trials, on_the_way)
     return boundaries
 
 

@@ -47,8 +47,7 @@ WIDTH = 120
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--json", "as_json", is_flag=True, help="One JSON object with every draw.")
 @click.option("--check", is_flag=True, help="Exit with 1 when the robot fell.")
-@click.pass_context
-def stress(context: click.Context, motions: tuple[str, ...], as_json: bool, check: bool, **options: Any) -> None:
+def stress(motions: tuple[str, ...], as_json: bool, check: bool, **options: Any) -> None:
     """Disturb the simulated robot and count its falls.
 
     Servos, masses, floor, commands and sensors differ from what was planned, and somebody pushes. Draws take the
@@ -71,7 +70,7 @@ def stress(context: click.Context, motions: tuple[str, ...], as_json: bool, chec
     else:
         fell = _draws(robot, kinds, plans, motions or _builtins(), options, as_json)
     if check and fell:
-        context.exit(FELL)
+        click.get_current_context().exit(FELL)
 
 
 def _builtins() -> tuple[str, ...]:
