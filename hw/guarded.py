@@ -11,14 +11,14 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError, NaoimitateError
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.fsm.fall_latch import Action, FallLatch
 from naoimitate.hw.condition import WATCHED, Condition, Delays, GuardSettings, GuardStatus
-from naoimitate.hw.driver import Driver, RobotState
+from naoimitate.hw.driver import INTERRUPTED, Driver, RobotState
 from naoimitate.hw.lean import UPRIGHT, lean
 from naoimitate.hw.spell import Spell
 
@@ -26,6 +26,10 @@ __all__ = ["NOT_LIVE", "Condition", "Delays", "GuardSettings", "GuardStatus", "G
 
 GRACE = 0.05
 """[s] that an emergency stop waits for the driver to let go of the robot; what takes longer goes on by itself."""
+LOOK = 0.002
+"""[s] between two looks meanwhile."""
+AGAIN = 0.05
+"""[s] after which a driver that is still connecting is stopped again."""
 NOT_LIVE = "not live"
 """Why a command is refused before ``connect`` and after the end."""
 
@@ -47,10 +51,11 @@ class GuardedDriver:
         self.__driver, self._gate, self._settings, self._clock = driver, gate, settings or GuardSettings(), clock
         self._lock = threading.RLock()
         self._latch = FallLatch(self._settings.fall)
-        self._ended = threading.Lock()
-        self._letting_go: threading.Thread | None = None
+        self._ended, self._gone, self._arrived = threading.Lock(), threading.Event(), threading.Event()
+        self._gone.set()
         self._alive, self._problem = Condition.OFF, ""
         self._over: Condition | None = None
+        self._pressed = False
         self._accepted, self._refused = 0, Counter[str]()
         self._refusing: tuple[str, ...] = ()
         self._catching_up, self._delays = False, Delays()
@@ -84,48 +89,57 @@ class GuardedDriver:
     @property
     def _condition(self) -> Condition:
         """How it ended, or what it is in: an end that comes in between is never written over."""
-        return self._over or self._alive
+        return Condition.EMERGENCY if self._pressed else self._over or self._alive
 
     @property
     def status(self) -> GuardStatus:
-        """How things are now."""
-        with self._lock:
-            held = self._clock() - self._passed if self._condition is Condition.LIVE else 0.0
-            return GuardStatus(
-                self._condition,
-                self._accepted,
-                dict(self._refused),
-                self._refusing,
-                held,
-                self._lean,
-                self._alarms,
-                self._problem,
-                self._catching_up and self._condition is Condition.LIVE,
-            )
+        """How things are now. Waits for nobody: ``connect`` may take long, and what it does is to be seen meanwhile."""
+        condition = self._condition
+        return GuardStatus(
+            condition,
+            self._accepted,
+            dict(self._refused),
+            self._refusing,
+            self._clock() - self._passed if condition is Condition.LIVE else 0.0,
+            self._lean,
+            self._alarms,
+            self._problem,
+            self._catching_up and condition is Condition.LIVE,
+        )
 
     def connect(self) -> None:
         """Connect the driver; commands then pass from where the robot is measured to stand.
 
-        Raises DriverError after a fall or an emergency stop that nobody has reset, and what the driver raises.
+        Raises DriverError after a fall or an emergency stop that nobody has reset, and where the driver cannot.
         """
         with self._lock:
             if self._condition in (Condition.FALLING, Condition.FALLEN, Condition.EMERGENCY):
                 raise DriverError(f"{self._condition.value}: put the robot on its feet, then reset and connect again")
-            self._wait_until_let_go()
-            self._latch, self._ended = FallLatch(self._settings.fall), threading.Lock()
-            self._command, self._problem, self._refusing = None, "", ()
+            self._end(Condition.STOPPED)  # a connection that nobody has ended
+            self._gone.wait()
+            self._latch, self._command, self._problem, self._refusing = FallLatch(self._settings.fall), None, "", ()
+            self._ended, self._gone, self._arrived = threading.Lock(), threading.Event(), threading.Event()
             self._alive, self._over = Condition.CONNECTING, None
             try:
-                self.__driver.connect()
-                self._begin(self.__driver.read())
+                self._connect_driver()
             except BaseException:
                 self._end(Condition.STOPPED)
                 raise
             if self._condition is not Condition.CONNECTING:
-                self._wait_until_let_go()
-                self._try(self.__driver.stop)  # again: the driver may have gone on after the first
+                self._gone.wait()
+                self._try(self.__driver.stop)  # again: the driver may have gone on after the last
                 raise DriverError(f"{self._condition.value} while the robot was being connected")
             self._alive = Condition.LIVE
+
+    def _connect_driver(self) -> None:
+        with self._used() as driver:
+            try:
+                if self._pressed:  # since connecting began, but before there was a connection to end
+                    raise DriverError(INTERRUPTED)
+                driver.connect()
+            finally:
+                self._arrived.set()
+            self._begin(driver.read())
 
     def _begin(self, state: RobotState) -> None:
         """Start gate and latch where the robot is."""
@@ -137,17 +151,13 @@ class GuardedDriver:
     def read(self) -> RobotState:
         """The robot's newest state, once the fall latch has seen it.
 
-        A driver that fails here ends the motion: a robot that cannot be watched is let go of. Its error is raised.
+        A driver that fails here ends the motion: a robot that cannot be watched is let go of. Raises NaoimitateError.
         """
-        try:
-            state = self.__driver.read()
-        except NaoimitateError as error:
-            self._problem = str(error)
-            self._end(Condition.STOPPED)
-            raise
-        with self._lock:
-            self._state = state
-            self._watch(state)
+        with self._used() as driver:
+            state = driver.read()
+            with self._lock:
+                self._state = state
+                self._watch(state)
         return state
 
     def write(self, command: RobotCommand) -> None:
@@ -176,29 +186,38 @@ class GuardedDriver:
             self._delays = Delays(gated - started, time.perf_counter() - gated)
 
     def _hand_over(self, command: RobotCommand) -> None:
-        try:
-            self.__driver.write(command)
-        except NaoimitateError as error:
-            self._problem = str(error)
-            self._end(Condition.STOPPED)
+        with contextlib.suppress(NaoimitateError), self._used() as driver:
+            driver.write(command)
 
     def soften(self, share: float) -> None:
-        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value; ignored unless it holds itself."""
+        """Turn the servos' stiffness down to a share, 0 to 1, of its normal value; ignored unless it holds itself.
+
+        A driver that fails is let go of, and its error raised.
+        """
         if self._condition in (Condition.LIVE, Condition.FAULT):
-            self.__driver.soften(min(max(share, 0.0), 1.0))
+            with self._used() as driver:
+                driver.soften(min(max(share, 0.0), 1.0))
 
     def stop(self) -> None:
-        """End the motion safely and let go of the robot; may be called twice."""
+        """End the motion safely and let go of the robot; returns when that is done. May be called twice.
+
+        Where the wait is interrupted (Ctrl-C), letting go goes on by itself, and a second ``stop`` waits for it again.
+        """
         self._end(Condition.STOPPED)
-        self._wait_until_let_go()
+        self._gone.wait()
 
     def emergency_stop(self) -> None:
-        """Every motion ends at once and no command passes; the servos become softer; the robot is let go of.
+        """End every motion at once, soften the servos, then let go of the robot: hold it, it ends limp.
 
-        The last command that passed is a stable pose, so the robot stands meanwhile. May be called twice: the driver's
-        own emergency stop is repeated. Nothing here waits for a lock, since whoever holds one may be the one that is
-        interrupted, nor longer than ``GRACE``: another thread goes on with letting go, and ``stop`` waits for it.
+        First the driver's own emergency stop, then ``emergency_stiffness``, then the driver's ``stop``, which may take
+        seconds. Until that is over the robot stands in the last command that passed, a balanced pose. A robot that
+        falls meanwhile is not softened more. May be called twice: the driver's own emergency stop is repeated. No
+        command passes any more until ``reset``.
+
+        Nothing here waits for a lock, since whoever holds one may be the one that is interrupted, nor longer than
+        ``GRACE``: another thread goes on with letting go, and ``stop`` waits for it.
         """
+        self._pressed = True
         self._try(self.__driver.emergency_stop)
         self._end(Condition.EMERGENCY, self._settings.emergency_stiffness)
 
@@ -207,13 +226,13 @@ class GuardedDriver:
         with self._lock:
             if self._condition is Condition.FALLING:
                 raise DriverError("the robot is falling: wait until it lies, put it on its feet, then reset")
-            self._latch.reset()
             if self._condition in (Condition.FALLEN, Condition.EMERGENCY):
-                self._over = Condition.STOPPED
+                self._over, self._pressed = Condition.STOPPED, False
 
     def _refuse(self, reasons: tuple[str, ...]) -> None:
         self._refusing = reasons
-        self._refused.update(reasons)
+        if reasons:
+            self._refused = self._refused + Counter(reasons)  # a new one, since other threads read it
 
     def _watch(self, state: RobotState) -> None:
         """Alarms and faults, and the fall latch once per new reading."""
@@ -236,33 +255,60 @@ class GuardedDriver:
             self._end(Condition.FALLEN)
 
     def _end(self, condition: Condition, stiffness: float | None = None) -> None:
-        """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does."""
+        """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does.
+
+        A thread of its own lets go, so that nothing which interrupts this one leaves the robot as it is.
+        """
         if self._alive is Condition.OFF or not self._ended.acquire(blocking=False):
-            self._over = condition if condition is Condition.EMERGENCY else self._over
             return
         fell = self._alive is Condition.FALLING
-        self._over = Condition.FALLEN if fell and condition is not Condition.EMERGENCY else condition
-        if stiffness is not None and not fell:
-            self._try(lambda: self.__driver.soften(stiffness))
+        self._over = Condition.FALLEN if fell else condition
+        try:
+            if stiffness is not None and not fell:
+                self._try(lambda: self.__driver.soften(stiffness))
+        finally:
+            threading.Thread(target=self._let_go, args=(self._gone,), name="letting go").start()
         if condition is not Condition.EMERGENCY:
-            self._try(self.__driver.stop)
+            self._gone.wait()
             return
-        self._letting_go = threading.Thread(target=lambda: self._try(self.__driver.stop), name="letting go")
-        self._letting_go.start()
-        self._letting_go.join(GRACE)
+        end = time.monotonic() + GRACE
+        while not self._gone.is_set() and time.monotonic() < end:  # ``wait`` takes a lock
+            time.sleep(LOOK)
 
-    def _wait_until_let_go(self) -> None:
-        """Until an emergency stop has done the last of what it does."""
-        thread = self._letting_go
-        if thread is not None:
-            thread.join()
+    def _let_go(self, gone: threading.Event) -> None:
+        """Stop the driver; one that is connecting again and again, since what came before it began does not count."""
+        self._try(self.__driver.stop)
+        while not self._arrived.wait(AGAIN):
+            if self._pressed:
+                self._try(self.__driver.emergency_stop)
+            self._try(self.__driver.stop)
+        gone.set()
+
+    @contextlib.contextmanager
+    def _used(self) -> Iterator[Driver]:
+        """The driver, to do something with: where it fails in any way the motion ends, with an error of one line."""
+        try:
+            yield self.__driver
+        except Exception as error:  # a driver may fail in any way
+            self._problem = _line(error)
+            self._end(Condition.STOPPED)
+            if isinstance(error, NaoimitateError):
+                raise
+            raise DriverError(self._problem) from error
 
     def _try(self, do: Callable[[], None]) -> None:
         """Do what must not stop the rest from being done."""
         try:
             do()
         except Exception as error:  # a driver may fail in any way; the end goes on
-            self._problem = str(error) or type(error).__name__
+            self._problem = _line(error)
+
+
+def _line(error: Exception) -> str:
+    """What to tell an operator: an error that was meant for people as it is."""
+    if isinstance(error, NaoimitateError):
+        return str(error)
+    return f"the driver failed ({type(error).__name__}: {' '.join(str(error).split())})"
 
 
 def _turning(gyro: Array) -> float:

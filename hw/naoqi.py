@@ -97,7 +97,9 @@ class NaoqiDriver:
         self._compensation = GravityCompensation(robot) if self._settings.servo_stiffness else None
         self._link: NaoqiLink | None = None
         self._thread: threading.Thread | None = None
+        self._leaving: NaoqiLink | None = None
         self._halt, self._stopping = threading.Event(), threading.RLock()
+        self._nonsense = ""
         self._state = blank(len(self._names), robot.postures["stand"])
         self._target: RobotCommand | None = None
         self._began = time.monotonic()
@@ -149,9 +151,11 @@ class NaoqiDriver:
         silent = self._now() - newest.time
         if silent < SILENCE:
             return newest
+        nonsense = self._nonsense
+        what = f"no sense in what the robot answers ({nonsense})" if nonsense else "the robot has not answered"
         if silent >= GONE:
-            return replace(newest, faults=(*newest.faults, f"the robot has not answered for {GONE:g} s"))
-        return replace(newest, alarms=(*newest.alarms, f"the robot has not answered for {silent:.1f} s"))
+            return replace(newest, faults=(*newest.faults, f"{what} for {GONE:g} s"))
+        return replace(newest, alarms=(*newest.alarms, f"{what} for {silent:.1f} s"))
 
     def write(self, command: RobotCommand) -> None:
         """Replace the command that is sent from the next period on; after ``stop`` it leads to nothing."""
@@ -163,7 +167,10 @@ class NaoqiDriver:
             self._link.ask("ALMotion", "setStiffnesses", "Body", float(share * self._settings.stiffness))
 
     def emergency_stop(self) -> None:
-        """Send nothing more, and end every motion that ALMotion has under way; the robot holds where it is, stiff."""
+        """Send nothing more, and end every motion that ALMotion has under way; the robot holds where it is, stiff.
+
+        Letting go of it, once ``stop`` has begun with that, is not ended any more.
+        """
         self._halt.set()
         link = self._link
         if link is not None:
@@ -171,27 +178,34 @@ class NaoqiDriver:
                 link.ask("ALMotion", "killAll")
 
     def stop(self) -> None:
-        """Send nothing more; on its feet the robot crouches and rests, otherwise its servos go off as it lies."""
+        """Send nothing more; on its feet the robot crouches and rests, otherwise its servos go off as it lies.
+
+        One that is interrupted may be repeated; where nobody does, the robot rests when the program ends.
+        """
         with self._stopping:
-            link, self._link = self._link, None
             self._halt.set()
+            if self._link is not None:
+                self._leaving, self._link = self._link, None
+            link = self._leaving
             if self._thread is not None:
                 self._thread.join(2.0)
                 self._thread = None
             if link is None:
                 return
-            with contextlib.suppress(DriverError):  # what follows ends all motion as well
-                link.call("ALMotion", "killAll", patience=2.0)
+            gone: DriverError | None = None
             try:
                 self._let_go(link)
-            except DriverError:
-                if link.open:  # else it is gone and cannot be told: ``read`` has said so
-                    raise
-            finally:
-                link.close()
+            except DriverError as error:
+                gone = error if link.open else None  # else it is gone and cannot be told: ``read`` has said so
+            link.close()
+            self._leaving = None
+            if gone is not None:
+                raise gone
 
     def _let_go(self, link: NaoqiLink) -> None:
         """Crouch and rest, which takes some seconds, or go limp where the robot lies already."""
+        with contextlib.suppress(DriverError):  # what follows ends all motion as well
+            link.call("ALMotion", "killAll", patience=2.0)
         if posture_family(link) in ON_ITS_FEET and not self._state.fell:
             link.call("ALMotion", "rest", patience=20.0)
         else:
@@ -216,7 +230,7 @@ class NaoqiDriver:
 
     def _start_from(self, link: NaoqiLink) -> None:
         """The robot's first state, its speeds, and no target."""
-        self._began, self._target = time.monotonic(), None
+        self._began, self._target, self._nonsense = time.monotonic(), None, ""
         limits = link.call("ALMotion", "getLimits", "Body")
         by_name = dict(zip(link.call("ALMotion", "getBodyNames", "Body"), limits, strict=True))
         self._speed = np.array([by_name[name][2] for name in self._names], dtype=np.float64)
@@ -227,25 +241,32 @@ class NaoqiDriver:
         self._sent, self._opening = np.array(servos, dtype=np.float64), np.full(2, np.nan)
 
     def _run(self, link: NaoqiLink, halt: threading.Event) -> None:
-        """The robot's period: send, ask, and take the answers to what was asked before."""
+        """The robot's period: send, ask, and take the answers to what was asked before.
+
+        Nothing ends it but the end of the connection: what cannot be understood is told in ``read``.
+        """
         asked: tuple[Future[Any], Future[Any]] | None = None
         due = time.monotonic()
         while not halt.is_set() and link.open:
-            with contextlib.suppress(DriverError):  # a robot that is gone shows in ``read``
+            try:
                 self._send(link)
                 if asked is not None and all(future.done() for future in asked):
-                    self._take(*asked)
-                    asked = None
+                    answers, asked = asked, None
+                    self._take(*answers)
                 if asked is None:
                     sensed = link.ask("ALMotion", "getAngles", self._names, True)
                     asked = sensed, link.ask("ALMemory", "getListData", self._keys)
+            except DriverError:
+                pass  # a robot that is gone shows in ``read``
+            except Exception as error:  # an answer may be anything
+                self._nonsense = f"{type(error).__name__}: {' '.join(str(error).split())}"
             due = max(due + self.period, time.monotonic())
             halt.wait(max(0.0, due - time.monotonic()))
 
     def _take(self, angles: Future[Any], values: Future[Any]) -> None:
         """A new state from two answers; where one failed, the old state stays and grows old."""
         if angles.exception() is None and values.exception() is None:
-            self._state = self._sensed(angles.result(), values.result())
+            self._state, self._nonsense = self._sensed(angles.result(), values.result()), ""
 
     def _sensed(self, servos: Any, values: Any) -> RobotState:
         planned = UPRIGHT if self._target is None else self._target.base_quat

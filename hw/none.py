@@ -15,8 +15,8 @@ from naoimitate.robot.model import RobotModel
 class NoDriver:
     """A robot that stands in its posture ``stand`` and then is where the newest command says.
 
-    take: called with every command, such as the ``append`` of a list or ``lambda c: print(one_line(c))``.
-    What only a body could feel is NaN in its state.
+    take: called with every command, such as the ``append`` of a list. What only a body could feel is NaN in its state,
+    and nothing is known of its torso in the world.
     """
 
     def __init__(
@@ -52,8 +52,6 @@ class NoDriver:
             accelerometer=_unknown(3),
             fsr=_unknown(2, 4),
             fell=False,
-            base_pos=None if command is None else command.base_pos,
-            base_quat=None if command is None else command.base_quat,
         )
 
     def write(self, command: RobotCommand) -> None:
@@ -74,12 +72,6 @@ class NoDriver:
     def stop(self) -> None:
         """Ignore all further commands."""
         self._open = False
-
-
-def one_line(command: RobotCommand) -> str:
-    """A command for a person to read: time, feet, offset, hands, joints in degrees."""
-    angles = " ".join(f"{angle:.1f}" for angle in np.degrees(command.q))
-    return f"{command.time:9.3f} s  {command.support}  offset {command.offset:.2f}  {angles}"
 
 
 def _unknown(*shape: int) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from can_rig import rig
+from second_robot import write_second_robot
 
 from naoimitate import load_robot
 from naoimitate.cli import run
@@ -51,3 +52,12 @@ def test_a_folder_without_its_database_is_one_clear_message(folder: Path, capsys
     assert run(["can-stub", "--robot", str(folder), "--interface", "virtual", "--channel", "cli"]) == 2
     said = capsys.readouterr().err
     assert f"there is no CAN database {folder / 'can.dbc'}" in said and said.count("\n") == 1
+
+
+def test_a_robot_without_motors_on_a_bus_is_one_clear_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = write_second_robot(tmp_path)
+    assert run(["can-stub", "--robot", str(folder), "--interface", "virtual", "--channel", "cli"]) == 2
+    said = capsys.readouterr().err
+    assert "second has no motors on a CAN bus: add a section `can`" in said and said.count("\n") == 1

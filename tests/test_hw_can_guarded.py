@@ -41,7 +41,7 @@ class Life:
         """A calm stand in which the head looks left and right."""
         moment = time.monotonic() - self._begin
         q = self._q.copy()
-        q[0] = 0.6 * np.sin(2.0 * moment)
+        q[0] = 0.6 * np.sin(moment)  # slow enough that a stuck motor is away for long, wherever it sticks
         return replace(self._calm, time=moment, q=q)
 
     def until(self, true: Callable[[GuardStatus], bool], patience: float = 5.0) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import signal
 import socket
 import subprocess
 import sys
@@ -232,6 +234,20 @@ def test_what_makes_a_robot_disobey_is_a_fault(connect: Callable[..., NaoqiDrive
     wait_for(lambda: len(driver.read().faults) == 2)
 
 
+def test_answers_that_make_no_sense_are_told_as_such_and_the_robot_is_still_commanded(
+    connect: Callable[..., NaoqiDriver], fake: RemoteNao
+) -> None:
+    driver = connect()
+    angles = fake.angles
+    fake.angles = {**angles, "HeadYaw": "warm"}
+    wait_for(lambda: driver.read().alarms != ())
+    assert driver.read().alarms[0].startswith("no sense in what the robot answers (ValueError: could not convert")
+    fake.sent = []
+    driver.write(command(turned(0.01)))
+    wait_for(lambda: fake.sent != [])
+    wait_for(lambda: driver.read().alarms == (), 5.0)
+
+
 def test_behind_the_guard_a_robot_that_falls_silent_is_in_fault_and_one_that_is_lost_is_let_go_of(
     fake: RemoteNao,
 ) -> None:
@@ -365,6 +381,24 @@ def test_a_program_that_is_killed_leaves_a_robot_at_rest(fake: RemoteNao, tmp_pa
     )
     assert subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=False).returncode == -9
     wait_for(lambda: fake.done[-2:] == [("killAll",), ("rest",)], 15.0)
+
+
+def test_a_stop_that_is_interrupted_can_be_repeated(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:
+    driver = connect()
+    fake.order("event", "resting", False)
+    before = signal.signal(signal.SIGUSR1, signal.default_int_handler)
+    try:
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGUSR1)).start()
+        with pytest.raises(KeyboardInterrupt):
+            driver.stop()
+    finally:
+        signal.signal(signal.SIGUSR1, before)
+    driver.emergency_stop()
+    fake.order("event", "resting", True)
+    count = len(fake.done)
+    driver.stop()
+    assert fake.done[count:] == [("killAll",), ("rest",)]
+    assert not [thread for thread in threading.enumerate() if thread.name.startswith("naoqi")]
 
 
 def test_a_child_that_dies_is_a_connection_that_broke(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:

@@ -47,7 +47,8 @@ def can_stub(
     from naoimitate.robot import load_robot
 
     model = load_robot(robot, robot_version)
-    wanted = [parse_fault(text, motor_numbers(model)) for text in faults]
+    motors = motor_numbers(model)
+    wanted = [parse_fault(text, motors) for text in faults]
     bus = open_bus(interface, channel, int(model.data["can"].get("bitrate", 1_000_000)))
     with bus:
         stub = CanStub(model, bus, wanted, database, posture)
