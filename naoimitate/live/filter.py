@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 
@@ -85,15 +86,23 @@ class LandmarkFilter:
         return replace(frame, time=time, landmarks=position + (time - self._time) * velocity)
 
     def delay(self, rate: float, frequency: float = 1.0) -> float:
-        """By how much (s) a landmark that swings at ``frequency`` Hz is late, at frames of ``rate`` Hz."""
-        dt, covariance = 1.0 / rate, self._covariance.copy()
-        for _ in range(200):
-            gain, covariance = _kalman(dt, covariance, self._s)
-        step = np.array([[1.0, dt], [0.0, 1.0]])
-        left = (np.eye(2) - np.outer(gain, [1.0, 0.0])) @ step
-        z = np.exp(2j * np.pi * frequency * dt)
-        response = (np.linalg.solve(z * np.eye(2) - left, gain) * z)[0]
-        return float(-np.angle(response) / (2.0 * np.pi * frequency))
+        """By how much (s) a landmark that swings at ``frequency`` Hz is late, at frames of ``rate`` Hz; NaN at none.
+
+        The steady gains are those of the alpha-beta filter with the same noise (Kalata 1984, The tracking index, IEEE
+        Trans. AES-20), the delay is the phase of its response. Cheap, and safe from another thread.
+        """
+        if not rate > 0.0:
+            return math.nan
+        dt = 1.0 / rate
+        if dt >= self._s.longest_gap:
+            return 0.0
+        index = self._s.acceleration * dt**2 / self._s.noise
+        root = (4.0 + index - math.sqrt(8.0 * index + index**2)) / 4.0
+        alpha = 1.0 - root**2
+        beta = 2.0 * (2.0 - alpha) - 4.0 * root
+        z = cmath.exp(2j * math.pi * frequency * dt)
+        response = z * (alpha * (z - 1.0) + beta) / (z**2 - (2.0 - alpha - beta) * z + 1.0 - alpha)
+        return -cmath.phase(response) / (2.0 * math.pi * frequency)
 
     def _start(self, measured: Array, time: float) -> None:
         self._time, self._state = time, np.stack([measured, np.zeros_like(measured)])

@@ -1,29 +1,41 @@
 """The stream contract: the newest frame of one sender wins, nothing waits, and what is wrong is counted.
 
-Pure: time comes with the datagrams. A frame older than the last used one is dropped, unless three in a row go on from
-each other: then the sender has begun again. Of several senders the first one is listened to until it has been silent
-for a second.
+Pure: time comes with the datagrams. Which frames are in order says ``order``. Of several senders the first one that
+shows a person is listened to until it has shown nobody for a second; until then each has a decoder of its own.
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import OrderedDict
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from naoimitate.core.errors import DatagramError
+from naoimitate.core.frames import LANDMARK, SIDES
+from naoimitate.live.order import Order
 from naoimitate.live.sample import Decoder, Sample, StreamProtocol
 
 Address = tuple[str, int]
 
-BELIEVED = 3
-"""Frames that must follow each other before a counter that jumped is believed."""
-LARGEST_STEP = 1000
-"""A counter that grows by more in a frame has jumped."""
 SILENCE = 1.0
-"""[s] after which another sender may take over."""
-RECENT = 256
-"""Arrivals that rate and jitter are measured on."""
+"""[s] without a person after which another sender may take over."""
+SENDERS = 8
+"""Senders that are decoded at a time while none shows a person; who spoke longest ago makes room."""
+RECENT = 512
+"""Arrivals that jitter is measured on."""
+RATED = 1.0
+"""[s] before now in which the frames came that the rate is measured on."""
+LACKING = 1.0
+"""[s] for which landmarks must be missing before it is said."""
+LONGEST_REASON = 200
+"""Characters of a reason: it may quote what the sender wrote."""
+NEEDED = tuple(
+    f"{side}_{name}" for side in SIDES for name in ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "toe")
+)
+"""Landmarks without which nobody can be imitated."""
+_NEEDED = [LANDMARK[name] for name in NEEDED]
 
 
 @dataclass
@@ -35,7 +47,7 @@ class Counts:
     late: int = 0
     """Frames older than the last one that was used, duplicates among them."""
     lost: int = 0
-    """Numbers that the sender's counter has skipped."""
+    """Numbers of the sender's counter that have not come, not even late."""
     damaged: int = 0
     """Datagrams that the protocol refuses."""
     foreign: int = 0
@@ -47,20 +59,23 @@ class Counts:
 
 
 class Stream:
-    """The newest frame of one person of one sender."""
+    """The newest frame of one person of one sender. One thread takes datagrams, others may read all but ``newest``."""
 
     def __init__(
         self, protocol: StreamProtocol, known: tuple[StreamProtocol, ...], allow: str | None = None, person: int = 0
     ) -> None:
         self._protocol, self._known, self._allow, self._person = protocol, known, allow, person
-        self._decoder: Decoder = protocol.decoder()
+        self._decoders: OrderedDict[Address, Decoder] = OrderedDict()
         self.counts = Counts()
         self.sender: Address | None = None
+        """Who is listened to."""
         self._heard = -math.inf
-        self._last: int | float | None = None
-        self._strangers: list[int | float] = []
-        self._arrivals: deque[float] = deque(maxlen=RECENT)
+        self._order = Order()
+        self._arrivals: tuple[float, ...] = ()
         self._newest: tuple[float, Sample] | None = None
+        self._reason = ""
+        self._missing: tuple[str, ...] = ()
+        self._lacking, self._seen = math.nan, math.nan
 
     def take(self, arrival: float, address: Address, datagram: bytes) -> None:
         """Take a datagram that came at ``arrival`` s from an address; never raises."""
@@ -68,17 +83,16 @@ class Stream:
         if not self._listens_to(arrival, address):
             self.counts.foreign += 1
             return
+        decoder = self._decoders.get(address) or self._protocol.decoder()
         try:
-            samples = self._decoder.feed(datagram)
-        except DatagramError:
-            self._refuse(datagram)
+            samples = decoder.feed(datagram)
+        except DatagramError as error:
+            self._refuse(datagram, error)
             return
-        self.sender, self._heard = address, arrival
+        self._keep(address, decoder)
         for sample in samples:
-            if sample.person == self._person and self._is_new(sample):
-                self.counts.frames += 1
-                self._arrivals.append(arrival)
-                self._newest = arrival, sample
+            if sample.person == self._person:
+                self._see(arrival, address, sample)
 
     def newest(self) -> tuple[float, Sample] | None:
         """The newest frame since the last call, with its arrival; None where none has come."""
@@ -87,71 +101,101 @@ class Stream:
 
     @property
     def rate(self) -> float:
-        """Frames a second, lately; 0 with fewer than two."""
-        if len(self._arrivals) < 2 or self._arrivals[-1] <= self._arrivals[0]:
+        """Frames a second when the last one came; 0 with fewer than two."""
+        arrivals = self._arrivals
+        return self.rate_at(arrivals[-1]) if arrivals else 0.0
+
+    def rate_at(self, now: float) -> float:
+        """Frames a second in the last second before ``now`` s; falls to 0 when none come any more."""
+        recent = [arrival for arrival in self._arrivals if now - RATED <= arrival]
+        if len(recent) < 2 or recent[-1] <= recent[0]:
             return 0.0
-        return (len(self._arrivals) - 1) / (self._arrivals[-1] - self._arrivals[0])
+        gap = (recent[-1] - recent[0]) / (len(recent) - 1)
+        return (len(recent) - 1) / (recent[-1] - recent[0] + max(now - recent[-1] - gap, 0.0))
 
     @property
     def jitter(self) -> float:
         """Mean deviation (s) of the gaps between frames from their mean."""
-        gaps = [b - a for a, b in zip(self._arrivals, list(self._arrivals)[1:], strict=False)]
-        mean = sum(gaps) / len(gaps) if gaps else 0.0
-        return sum(abs(gap - mean) for gap in gaps) / len(gaps) if gaps else 0.0
+        gaps = np.diff(self._arrivals)
+        return float(np.abs(gaps - gaps.mean()).mean()) if len(gaps) else 0.0
 
     def complaint(self) -> str:
         """What is wrong with what comes, in a sentence; empty where it is understood, or nothing comes."""
-        c, title = self.counts, self._protocol.title
+        c, title, others = self.counts, self._protocol.title, dict(self.counts.others)
+        if self._seen - self._lacking >= LACKING:
+            return self._lack()
         if c.frames or not c.datagrams:
             return ""
-        if c.others:
-            other = max(c.others, key=lambda other: c.others[other])
+        other = max(others, key=lambda other: others[other], default="")
+        if other and 2 * others[other] >= c.damaged:
             return f"this looks like {other}, not {title}: choose its --source"
         if c.damaged:
-            return f"{c.damaged} datagrams came that are not {title}: look at the sender's protocol"
+            return f"{c.damaged} datagrams came that are not {title}: {self._reason}"
         if c.foreign:
             return f"{c.foreign} datagrams came, none of them from {self._allow}: look at --allow"
         return f"{title} comes, but no whole person of it: let the sender stream poses, and of the first person"
 
+    def _lack(self) -> str:
+        """What the person lacks, and that others speak, too."""
+        missing = self._missing
+        what = "anything of the person" if len(missing) == len(NEEDED) else ", ".join(missing)
+        text = f"the sender does not see {what}: nobody can be imitated without"
+        if self.sender is None or not self.counts.foreign or self._allow is not None:
+            return text
+        return f"{text}; other senders than {self.sender[0]} are left out: choose one with --allow"
+
     def _listens_to(self, arrival: float, address: Address) -> bool:
         if self._allow is not None and address[0] != self._allow:
             return False
-        if self.sender in (None, address):
-            return True
-        if arrival - self._heard <= SILENCE:
-            return False
-        self._decoder, self._last, self._strangers = self._protocol.decoder(), None, []
-        return True
+        return self.sender in (None, address) or arrival - self._heard > SILENCE
 
-    def _refuse(self, datagram: bytes) -> None:
+    def _keep(self, address: Address, decoder: Decoder) -> None:
+        """Keep the decoder of whoever speaks, and of no crowd; that of the sender stays."""
+        self._decoders[address] = decoder
+        self._decoders.move_to_end(address)
+        if self.sender in self._decoders:
+            self._decoders.move_to_end(self.sender)
+        if len(self._decoders) > SENDERS:
+            self._decoders.popitem(last=False)
+
+    def _refuse(self, datagram: bytes, error: DatagramError) -> None:
         self.counts.damaged += 1
+        text = str(error)[:LONGEST_REASON]
+        self._reason = "".join(letter if letter.isprintable() else "?" for letter in text)
         for other in self._known:
             if other.name != self._protocol.name and other.recognises(datagram):
                 self.counts.others[other.title] = self.counts.others.get(other.title, 0) + 1
 
-    def _is_new(self, sample: Sample) -> bool:
+    def _see(self, arrival: float, address: Address, sample: Sample) -> None:
+        """A frame of our person: who shows somebody is listened to from now on."""
+        known = np.isfinite(sample.frame.landmarks[_NEEDED]).all(axis=1)
+        if address != self.sender and known.any():
+            self.sender = address
+            self._order.begin()
+            self._decoders = OrderedDict({address: self._decoders[address]})
+        self._look(arrival, tuple(name for name, there in zip(NEEDED, known, strict=True) if not there))
+        if address != self.sender:
+            return
+        self._heard = arrival
+        if self._is_new(arrival, sample):
+            self.counts.frames += 1
+            self._arrivals = (*self._arrivals[1 - RECENT :], arrival)
+            self._newest = arrival, sample
+
+    def _look(self, arrival: float, missing: tuple[str, ...]) -> None:
+        """Note what a frame lacks, and since when."""
+        if not missing:
+            self._lacking = math.nan
+        elif math.isnan(self._lacking):
+            self._lacking = arrival
+        self._seen, self._missing = arrival, missing
+
+    def _is_new(self, arrival: float, sample: Sample) -> bool:
         """Whether a sample is newer than the last used one; counts what was lost, late, or began again."""
         number = sample.frame.time if sample.sequence is None else sample.sequence
         if not math.isfinite(number):
             return True
-        if self._last is None or self._follows(self._last, number, sample):
-            if self._last is not None and sample.sequence is not None:
-                self.counts.lost += int(number - self._last) - 1
-            self._last, self._strangers = number, []
-            return True
-        if number == self._last:
-            self.counts.late += 1
-            return False
-        in_a_row = bool(self._strangers) and self._follows(self._strangers[-1], number, sample)
-        self._strangers = [*self._strangers, number] if in_a_row else [number]
-        if len(self._strangers) >= BELIEVED:
-            self.counts.restarts += 1
-            self._last, self._strangers = number, []
-            return True
-        self.counts.late += 1
-        return False
-
-    @staticmethod
-    def _follows(last: float, number: float, sample: Sample) -> bool:
-        most = LARGEST_STEP if sample.sequence is not None else LARGEST_STEP * 0.01
-        return 0 < number - last <= most
+        used = self._order.takes(number, arrival, sample.sequence is not None)
+        self.counts.late, self.counts.lost = self._order.late, self._order.lost
+        self.counts.restarts = self._order.restarts
+        return used
