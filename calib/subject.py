@@ -82,7 +82,7 @@ def parse_subject(text: str, name: str) -> Subject:
         landmarks = np.array([tpose["landmarks_m"][mark] for mark in LANDMARKS], dtype=np.float64)
         given = tpose["orientations_wxyz"]
         orientations = None if given is None else np.array([given[part] for part in SEGMENTS], dtype=np.float64)
-    except (yaml.YAMLError, KeyError, TypeError, ValueError):
+    except (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError):
         raise CalibrationError(f"{name}: not a subject file; make one with `naoimitate calibrate`") from None
     if landmarks.shape != (len(LANDMARKS), 3) or (
         orientations is not None and orientations.shape != (len(SEGMENTS), 4)

@@ -21,6 +21,7 @@ class State(enum.Enum):
     CLUTCHED = "clutched"
     HOLDING = "holding"
     RETURNING = "returning"
+    STOPPING = "stopping"
     FAULT = "fault"
     STOPPED = "stopped"
 
@@ -51,7 +52,7 @@ class Event(enum.Enum):
     RESET = "reset"
     """The operator says that the robot stands again."""
     STOP = "stop"
-    """The end of the session."""
+    """The end of the session; a second one does not wait for the robot to stand."""
 
 
 class Action(enum.Enum):
@@ -62,8 +63,9 @@ class Action(enum.Enum):
     BLEND = "blend in from where the robot is"
     HOLD = "keep to the operator's last posture"
     STAND = "blend to a stand"
-    SOFTEN = "lower the stiffness, stop"
-    LET_GO = "stop the driver"
+    FREEZE = "no command any more"
+    BEGIN = "begin from the robot's stand"
+    LET_GO = "let go of the robot"
 
 
 @dataclass(frozen=True)
@@ -79,13 +81,14 @@ class Edge:
 
 _S, _E, _A = State, Event, Action
 _ALIVE = (
-    _S.IDLE, _S.WAITING, _S.CALIBRATING, _S.BLENDING, _S.TRACKING, _S.CLUTCHED, _S.HOLDING, _S.RETURNING,
+    _S.WAITING, _S.CALIBRATING, _S.BLENDING, _S.TRACKING, _S.CLUTCHED, _S.HOLDING, _S.RETURNING,
 )  # fmt: skip
 
 EDGES: tuple[Edge, ...] = (
-    Edge(_S.IDLE, _E.START, None, _A.STAND, _S.WAITING),
+    Edge(_S.IDLE, _E.START, None, _A.BEGIN, _S.WAITING),
     Edge(_S.WAITING, _E.FRAME, False, _A.NONE, _S.CALIBRATING),
     Edge(_S.WAITING, _E.FRAME, True, _A.BLEND, _S.BLENDING),
+    Edge(_S.WAITING, _E.CLUTCH, True, _A.NONE, _S.CLUTCHED),
     Edge(_S.CALIBRATING, _E.TPOSE, None, _A.CALIBRATE, _S.BLENDING),
     Edge(_S.CALIBRATING, _E.LATE, None, _A.STAND, _S.WAITING),
     Edge(_S.BLENDING, _E.BLENDED, None, _A.NONE, _S.TRACKING),
@@ -98,15 +101,22 @@ EDGES: tuple[Edge, ...] = (
     Edge(_S.HOLDING, _E.FRAME, None, _A.BLEND, _S.BLENDING),
     Edge(_S.HOLDING, _E.CLUTCH, None, _A.NONE, _S.CLUTCHED),
     Edge(_S.HOLDING, _E.LOST, None, _A.STAND, _S.RETURNING),
-    Edge(_S.CLUTCHED, _E.CLUTCH, None, _A.BLEND, _S.BLENDING),
-    Edge(_S.CLUTCHED, _E.BODY, None, _A.NONE, _S.CLUTCHED),
+    Edge(_S.CLUTCHED, _E.CLUTCH, None, _A.NONE, _S.WAITING),
     Edge(_S.CLUTCHED, _E.TPOSE, None, _A.CALIBRATE, _S.BLENDING),
-    Edge(_S.CLUTCHED, _E.LOST, None, _A.STAND, _S.RETURNING),
+    Edge(_S.CLUTCHED, _E.LOST, None, _A.STAND, _S.CLUTCHED),
     Edge(_S.RETURNING, _E.FRAME, None, _A.BLEND, _S.BLENDING),
+    Edge(_S.RETURNING, _E.CLUTCH, None, _A.NONE, _S.CLUTCHED),
     Edge(_S.RETURNING, _E.STANDING, None, _A.NONE, _S.WAITING),
-    *(Edge(state, _E.FAULT, None, _A.SOFTEN, _S.FAULT) for state in _ALIVE),
-    Edge(_S.FAULT, _E.RESET, None, _A.STAND, _S.WAITING),
-    *(Edge(state, _E.STOP, None, _A.LET_GO, _S.STOPPED) for state in (*_ALIVE, _S.FAULT)),
+    *(
+        Edge(state, _E.BODY, None, _A.NONE, state)
+        for state in (_S.WAITING, _S.CALIBRATING, _S.CLUTCHED, _S.HOLDING, _S.RETURNING)
+    ),
+    *(Edge(state, _E.FAULT, None, _A.FREEZE, _S.FAULT) for state in (_S.IDLE, *_ALIVE, _S.STOPPING)),
+    Edge(_S.FAULT, _E.RESET, False, _A.BEGIN, _S.WAITING),
+    Edge(_S.FAULT, _E.RESET, True, _A.BEGIN, _S.CLUTCHED),
+    *(Edge(state, _E.STOP, None, _A.STAND, _S.STOPPING) for state in _ALIVE),
+    Edge(_S.STOPPING, _E.STANDING, None, _A.LET_GO, _S.STOPPED),
+    *(Edge(state, _E.STOP, None, _A.LET_GO, _S.STOPPED) for state in (_S.IDLE, _S.STOPPING, _S.FAULT)),
 )
 """Every edge; an event without one in a state changes nothing."""
 

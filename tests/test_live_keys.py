@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import pty
+import sys
+import time
+from collections.abc import Iterator
+
 import pytest
 
 from naoimitate.command_gate import CommandGate
@@ -10,7 +16,7 @@ from naoimitate.fsm.session import Event, State
 from naoimitate.hw.condition import Condition
 from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.hw.none import NoDriver
-from naoimitate.live.keys import obey
+from naoimitate.live.keys import Keys, obey
 from naoimitate.live.session import Session
 from naoimitate.robot.model import RobotModel
 
@@ -29,10 +35,34 @@ def driver(nao: RobotModel) -> GuardedDriver:
     return driver
 
 
-@pytest.mark.parametrize("keys", [" ", "c ", "q r c "])
-def test_an_emergency_stop_comes_before_every_other_key(session: Session, driver: GuardedDriver, keys: str) -> None:
-    assert not obey(keys, session, driver)
-    assert driver.status.condition is Condition.EMERGENCY
+@pytest.fixture
+def terminal(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """The operator's side of a terminal that is our standard input."""
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "r") as stdin:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        yield ours
+    os.close(ours)
+
+
+def test_the_emergency_stop_waits_for_nobody_and_other_keys_are_kept(driver: GuardedDriver, terminal: int) -> None:
+    with Keys(driver) as keys:
+        assert keys.open
+        os.write(terminal, b"c")
+        os.write(terminal, b"u q")
+        end = time.monotonic() + 10.0
+        while driver.status.condition is not Condition.EMERGENCY:
+            assert time.monotonic() < end
+            time.sleep(0.01)
+        assert sorted(keys.pressed()) == ["c", "q", "u"]
+        assert keys.pressed() == ""
+
+
+def test_without_a_terminal_there_are_no_keys(driver: GuardedDriver, monkeypatch: pytest.MonkeyPatch) -> None:
+    with open(os.devnull) as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        with Keys(driver) as keys:
+            assert not keys.open and keys.pressed() == ""
 
 
 def test_a_robot_that_follows_is_not_connected_anew(

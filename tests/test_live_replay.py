@@ -84,7 +84,8 @@ def test_a_recording_is_played_as_it_was_set_up_unless_the_operator_says_otherwi
     run = load_run(tmp_path / "a.npz")
     ticks = [t.tick for t in before]
     first = next(k for k, tick in enumerate(ticks) if tick.began)
-    shared = min(len(run), len(ticks) - first)
+    assert run.session is not None
+    shared = int(np.argmax(run.session == "stopping"))
     assert shared > 100
     assert np.array_equal(run.q[:shared], [t.command.q for t in ticks[first : first + shared]])
     assert command([*arguments, "--record", str(tmp_path / "b.rec")]) == 2
@@ -112,7 +113,7 @@ def test_a_motion_is_played_as_if_live(tmp_path: Path) -> None:
     arguments = ["live", "--source", "replay:builtin:wave", "--driver", "none", "--duration", "6.5", "--out", str(out)]
     assert command(arguments) == 0
     run = load_run(out)
-    assert run.session is not None and set(run.session) == {"blending", "tracking"}
+    assert run.session is not None and set(run.session) == {"blending", "tracking", "stopping", "stopped"}
     assert run.source == "replay:builtin:wave"
 
 

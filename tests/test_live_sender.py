@@ -20,7 +20,7 @@ from naoimitate.cli import run
 from naoimitate.core.errors import MotionFormatError, StreamError
 from naoimitate.core.frames import LANDMARK, HumanFrame, Motion
 from naoimitate.human.live_support import SupportEstimator
-from naoimitate.live.blend import minimum_jerk
+from naoimitate.live.fade import minimum_jerk
 from naoimitate.live.performance import BLEND, Performance, moved
 from naoimitate.live.protocols.plain import JsonDecoder, JsonEncoder
 from naoimitate.live.protocols.registry import PROTOCOLS, looks_like

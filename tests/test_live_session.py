@@ -113,6 +113,37 @@ def test_a_paused_operator_may_do_anything_and_is_blended_in_again(nao: RobotMod
     assert_smooth(nao, story)
 
 
+def test_a_pause_lasts_until_the_operator_ends_it(nao: RobotModel) -> None:
+    def person(time: float) -> HumanFrame | None:
+        return None if 7.0 < time < 19.0 else operator(time)
+
+    def act(session: Session, time: float) -> None:
+        if time in (6.0, 21.0):
+            session.tell(Event.CLUTCH)
+
+    story = play(nao, 24.0, person, act=act)
+    assert story.states() == ["calibrating", "blending", "tracking", "clutched", "blending", "tracking"]
+    assert story.at(20.9).command.support == "D"
+    assert np.abs(story.at(20.9).command.q - story.at(6.5).command.q).max() > 0.1, "nobody there: it stands"
+    assert_smooth(nao, story)
+
+
+def test_the_end_is_a_stand_on_both_feet_from_wherever_the_robot_is(nao: RobotModel) -> None:
+    lifted = [k for k, t in enumerate(play(nao, 12.0).ticks) if t.command.support != "D"]
+    story = play(nao, 18.0, act=lambda s, t: s.tell(Event.STOP) if t == round(lifted[20] * DT, 2) else None)
+    assert story.states() == ["calibrating", "blending", "tracking", "stopping", "stopped"]
+    assert story.commands()[-1].support == "D"
+    assert_smooth(nao, story)
+
+
+def test_a_lost_operator_leaves_no_jerk(nao: RobotModel) -> None:
+    story = play(nao, 8.0, lambda t: None if t > 6.3 else operator(t))
+    assert story.states()[-1] == "holding"
+    at = round(6.55 / DT)
+    q = np.array([c.q for c in story.commands()])[at - 20 : at + 20]
+    assert np.abs(np.diff(q, 2, axis=0)).max() < 0.015
+
+
 def test_a_paused_operator_may_walk_off_and_turn_and_the_robot_goes_on_from_where_it_is(nao: RobotModel) -> None:
     def person(time: float) -> HumanFrame | None:
         frame = operator(time)
@@ -159,10 +190,14 @@ def test_a_fault_ends_the_session_until_the_robot_stands_again(nao: RobotModel) 
             session.tell(Event.FAULT, "it fell")
         if time == 8.0:
             session.tell(Event.RESET)
+        if time == 9.0:
+            session.tell(Event.CLUTCH)
 
-    story = play(nao, 9.0, act=act)
-    assert story.states() == ["calibrating", "blending", "tracking", "fault", "blending"]
+    story = play(nao, 10.0, act=act)
+    assert story.states() == ["calibrating", "blending", "tracking", "fault", "clutched", "blending"]
     assert story.at(7.0).state is State.FAULT
+    frozen = [t.command for t, at in zip(story.ticks, story.times, strict=True) if 6.0 <= at < 7.9]
+    assert np.ptp([c.q for c in frozen], axis=0).max() == 0.0
 
 
 def test_frames_of_nothing_and_of_nonsense_are_survived(nao: RobotModel) -> None:

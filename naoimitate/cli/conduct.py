@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +15,10 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from naoimitate.cli.feeds import Feed
+    from naoimitate.cli.signals import Signals
     from naoimitate.command_gate import CommandGate
     from naoimitate.hw.guarded import GuardedDriver
+    from naoimitate.live.keys import Keys
     from naoimitate.live.loop import Beat, Loop, Turn
     from naoimitate.live.recording import Recorder
     from naoimitate.live.session import Session
@@ -46,46 +48,65 @@ def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Record
     Raises StreamError at the end when nothing that came was understood.
     """
     from naoimitate.cli.run_writer import Writer
+    from naoimitate.cli.signals import Signals
     from naoimitate.core.errors import StreamError
+    from naoimitate.live.keys import Keys
     from naoimitate.live.loop import Loop
 
     feed, driver = rig.feed, rig.driver
-    writer = Writer(out, rig.session, driver, rig.robot, feed.name)
-    loop = Loop(rig.session, driver, [writer.take])
-    if recorder is not None:
-        loop.watch.append(recorder.beat)
-    turns = feed.turns(rig.session, driver.period, recorder.datagram if recorder else lambda datagram: None)
-    try:
-        rig.session.warm_up()
-        driver.connect()
-        with rig.watch:
-            click.echo(f"ready: {feed.ready}")
-            _run(rig, loop, turns, math.inf if duration is None else duration)
-    except KeyboardInterrupt:
-        click.echo("ended by the operator", err=True)
-    finally:
-        driver.stop()
-        feed.close()
+    with ExitStack() as ends:
+        signals = ends.enter_context(Signals(driver.emergency_stop))
+        ends.callback(lambda: click.echo("\n".join(_summary(rig))))
+        writer = Writer(out, rig.session, driver, rig.robot, feed.name)
+        ends.callback(lambda: [click.echo(line) for line in writer.close()])
         if recorder is not None:
-            recorder.close()
-        click.echo("\n".join([*writer.close(), *_summary(rig)]))
+            ends.callback(recorder.close)
+        ends.callback(feed.close)
+        keys = ends.enter_context(Keys(driver))
+        ends.callback(driver.stop)
+        loop = Loop(rig.session, driver, [writer.take], _complain, live=not feed.header)
+        if recorder is not None:
+            loop.watch.append(recorder.beat)
+        turns = feed.turns(rig.session, driver.period, recorder.datagram if recorder else lambda datagram: None)
+        try:
+            rig.session.warm_up()
+            driver.connect()
+            ends.enter_context(rig.watch)
+            click.echo(f"ready: {feed.ready}")
+            signals.polled = True
+            _run(rig, loop, turns, keys, signals, math.inf if duration is None else duration)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            signals.polled = True  # what follows is done to its end
+        if signals.count:
+            click.echo("ended by the operator", err=True)
     if complaint := feed.stream.complaint():
         raise StreamError(complaint)
 
 
-def _run(rig: Rig, loop: Loop, turns: Iterator[Turn], duration: float) -> None:
-    """The loop, with keys and a panel where there is a terminal, else with a line for what happens."""
-    from naoimitate.live.keys import listening, obey, pressed
+def _run(rig: Rig, loop: Loop, turns: Iterator[Turn], keys: Keys, signals: Signals, duration: float) -> None:
+    """The loop, with a panel where there is a terminal, else with a line for what happens."""
+    from naoimitate.live.keys import obey
     from naoimitate.live.panel import Panel
 
-    with listening() as keys:
-        if not keys:
-            loop.watch.append(Notices(rig.feed, rig.session).take)
-            loop.run(turns, duration)
-            return
-        with Panel(rig.session, rig.feed.stream, rig.driver, rig.gate) as panel:
-            loop.watch.append(panel.take)
-            loop.run(turns, duration, lambda: obey(pressed(), rig.session, rig.driver))
+    def ended() -> bool:
+        return signals.count > 0 or obey(keys.pressed(), rig.session, rig.driver)
+
+    def hurried() -> bool:
+        return signals.count > 1 or "q" in keys.pressed()
+
+    if not keys.open:
+        loop.watch.append(Notices(rig.feed, rig.session).take)
+        loop.run(turns, duration, ended, hurried)
+        return
+    with Panel(rig.session, rig.feed.stream, rig.driver, rig.gate) as panel:
+        loop.watch.append(panel.take)
+        loop.run(turns, duration, ended, hurried)
+
+
+def _complain(sentence: str) -> None:
+    click.echo(f"naoimitate: {sentence}", err=True)
 
 
 class Notices:
@@ -99,8 +120,8 @@ class Notices:
         from naoimitate.fsm.session import State
 
         state = beat.tick.state.value
-        if beat.tick.state is State.FAULT:
-            state += f": {self._session.reason}"
+        why = self._session.reason if beat.tick.state is State.FAULT else self._session.eye.complaint
+        state += f": {why}" if why else ""
         if time.monotonic() - self._begin > PATIENCE and not self._feed.stream.counts.frames:
             state = self._feed.stream.complaint() or f"nothing comes: still {self._feed.ready}"
         if state != self._said:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -43,7 +42,7 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 @click.option("--view", is_flag=True, help="Open a window on the simulated robot.")
 @click.option("--video", type=types.VIDEO_FILE, help="Film what the simulated robot sees with its head camera.")
 @click.option("--camera", metavar="NAME", help="What window and film look through [default: free; the head's first].")
-@click.option("--record", type=click.Path(path_type=Path, dir_okay=False), help="Write the raw stream to this file.")
+@click.option("--record", type=types.RECORDING_FILE, help="Write the raw stream to this file.")
 @click.option("--out", type=types.RUN_FILE, help="Run file to write.")
 @click.pass_context
 def live(context: click.Context, /, **options: Any) -> None:
@@ -52,11 +51,13 @@ def live(context: click.Context, /, **options: Any) -> None:
     Stand in a T-pose and hold it until the robot begins to follow. Ctrl-C ends the session safely.
     """
     from naoimitate.cli.feeds import open_feed
+    from naoimitate.cli.outputs import keep_apart
     from naoimitate.command_gate import CommandGate
     from naoimitate.hw.guarded import GuardedDriver
     from naoimitate.robot import load_robot
 
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    source = options["source"].removeprefix("replay:")
+    keep_apart([source, options["subject"]], [options["out"], options["record"], options["video"]])
     feed = open_feed(options["source"], options["bind"], options["port"], options["allow"])
     chosen = {key: value for key, value in options.items() if _is_chosen(context, key)}
     robot = load_robot(*_robot(chosen, feed.header))
@@ -103,7 +104,7 @@ def _recorder(rig: Rig, options: dict[str, Any]) -> Recorder | None:
         return None
     if rig.feed.header:
         raise click.UsageError("--record: this session is a recording already")
-    header = {"robot": rig.robot.name, "robot_version": rig.robot.version, "allow": options["allow"]}
+    header = {"robot": options["robot"], "robot_version": rig.robot.version, "allow": options["allow"]}
     return Recorder(path, {"protocol": rig.feed.protocol, "setup": rig.setup.header(), **header})
 
 

@@ -18,8 +18,12 @@ from naoimitate.live.stream import Stream
 
 SHORTEST = 0.002
 """[s] between two steps: a frame that comes sooner waits so long."""
+LONGEST = 0.015
+"""[s] between two steps: the run file has more than 50 frames a second whatever the driver's period."""
 REFUSED = 1.0
 """[s] in which the gate refuses every command, after which the session is in fault."""
+STANDING = 15.0
+"""[s] that a robot gets to stand on both feet at the end."""
 
 
 @dataclass(frozen=True)
@@ -64,28 +68,60 @@ class Beat:
 
 @dataclass
 class Loop:
-    """A session and its driver. watch: called with every beat."""
+    """A session and its driver.
+
+    watch: called with every beat; one that raises is told of by ``complain`` and not called again. live: whether the
+    driver's troubles are the session's; a recorded session goes its way, and troubles of its driver are raised.
+    """
 
     session: Session
     driver: GuardedDriver
     watch: list[Callable[[Beat], None]] = field(default_factory=list)
+    complain: Callable[[str], None] = lambda sentence: None
+    live: bool = True
     _refused_since: float = field(default=math.nan, init=False)
 
-    def run(self, turns: Iterator[Turn], duration: float = math.inf, ended: Callable[[], bool] = lambda: False) -> None:
-        """Run for ``duration`` s, until ``ended``, or until there are no more turns.
+    def run(
+        self,
+        turns: Iterator[Turn],
+        duration: float = math.inf,
+        ended: Callable[[], bool] = lambda: False,
+        hurried: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """Run for ``duration`` s, until ``ended``, or until there are no more turns; then let the robot stand.
 
-        The driver is connected before, and left connected.
+        hurried: whether nobody wants to wait for that. The driver is connected before, and left connected. Raises
+        DriverError for a trouble of the driver in a recorded session.
         """
-        begin, self._refused_since = math.nan, math.nan
+        begin = now = math.nan
         for turn in turns:
-            begin = turn.now if math.isnan(begin) else begin
+            begin, now = (turn.now if math.isnan(begin) else begin), turn.now
             self._beat(turn)
-            if turn.now - begin >= duration or ended():
+            if now - begin >= duration or ended():
                 break
+        if not math.isnan(now):
+            self._stand(now, hurried)
+
+    def _stand(self, now: float, hurried: Callable[[], bool]) -> None:
+        """End the session: blend to a stand, on both feet where the robot still obeys."""
         self.session.tell(Event.STOP)
+        begin = time.monotonic()
+        while self.session.state is State.STOPPING:
+            time.sleep(0.01)
+            passed = time.monotonic() - begin
+            if hurried() or passed > STANDING:
+                self.session.tell(Event.STOP)
+            started = time.perf_counter()
+            tick = self.session.step(now + passed)
+            self._beat(Turn(tick, now + passed, imitate=time.perf_counter() - started))
+        if self.session.state is State.FAULT:
+            self.session.tell(Event.STOP)
 
     def _beat(self, turn: Turn) -> None:
         """Hand a turn's command over; a fault moves nothing."""
+        if not self.live and any(event is Event.RESET for event, _ in turn.tick.told):
+            self.driver.reset()
+            self.driver.connect()
         gate = hand_over = 0.0
         if turn.tick.state is State.FAULT:
             with contextlib.suppress(DriverError):  # a robot that holds its pose may still fall: the guard watches
@@ -96,20 +132,29 @@ class Loop:
             self._look_after(self.driver.status, turn.now)
         latency = time.monotonic() - turn.arrival if turn.tick.fresh else math.nan
         beat = Beat(turn, latency, gate, hand_over)
-        for watcher in self.watch:
-            watcher(beat)
+        for watcher in tuple(self.watch):
+            try:
+                watcher(beat)
+            except Exception as error:  # whatever it is, the robot goes on
+                self.watch.remove(watcher)
+                with contextlib.suppress(Exception):
+                    self.complain(str(error) or type(error).__name__)
 
     def _look_after(self, status: GuardStatus, now: float) -> None:
-        """Tell the session of a robot that does not follow any more, and let go of it."""
-        if not status.refusing:
+        """Tell the session of a robot that does not follow any more; it keeps its pose."""
+        if not status.refusing or status.catching_up:
             self._refused_since = math.nan
         elif math.isnan(self._refused_since):
             self._refused_since = now
+        trouble = ""
         if status.condition is not Condition.LIVE:
-            self.session.tell(Event.FAULT, status.problem or status.condition.value)
+            trouble = status.problem or status.condition.value
         elif now - self._refused_since > REFUSED:
-            self.session.tell(Event.FAULT, f"commands are refused: {', '.join(status.refusing)}")
-            self.driver.emergency_stop()
+            trouble = f"commands are refused: {', '.join(status.refusing)}"
+        if trouble and not self.live:
+            raise DriverError(trouble)
+        if trouble:
+            self.session.tell(Event.FAULT, trouble)
 
 
 def listen(
@@ -126,7 +171,7 @@ def listen(
     last = time.monotonic()
     session.start()
     while not source.ended:
-        _receive(stream, source, last, period, record)
+        _receive(stream, source, last, min(period, LONGEST), record)
         newest = stream.newest()
         arrival = math.nan
         if newest is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import threading
 from collections import deque
@@ -77,6 +78,8 @@ class Panel:
         state = self._session.state.value
         if self._session.state is State.CALIBRATING:
             state += f": hold a T-pose for {self._session.countdown:.1f} s"
+        if self._session.eye.complaint:
+            state += f": {self._session.eye.complaint}"
         if self._session.reason:
             state += f": {self._session.reason}"
         rows = [("state", state)]
@@ -92,6 +95,8 @@ class Panel:
         rows.append(("other packets", f"{counts.damaged} damaged, {counts.foreign} of other senders"))
         complaint = self._stream.complaint()
         rows.extend([("trouble", complaint)] if complaint else [])
+        if rate > 0.0:
+            rows.append(("filter's delay", f"{1e3 * self._session.eye.filter.delay(rate):.0f} ms at 1 Hz"))
         rows.extend((stage, _delays(seconds)) for stage, seconds in self._stages.items())
         rows.append(("robot", f"{status.condition.value}, {sum(status.refused.values())} commands refused"))
         rows.extend(("alarm", alarm) for alarm in status.alarms)
@@ -99,7 +104,8 @@ class Panel:
 
     def _draw(self) -> None:
         while not self._halt.wait(PERIOD):
-            self._live.update(self.table(), refresh=True)
+            with contextlib.suppress(RuntimeError, OSError):  # what is shown changes meanwhile, or the terminal goes
+                self._live.update(self.table(), refresh=True)
 
 
 def why_it_waits(command: RobotCommand) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import LANDMARK, Array, HumanFrame, Motion
 from naoimitate.human.segments import center_of_mass
-from naoimitate.live.blend import Blend
+from naoimitate.live.fade import Fade
 from naoimitate.motion.tpose import heading
 
 BLEND = 1.0
@@ -33,13 +33,13 @@ class Performance:
         parts: list[tuple[float, Callable[[float], HumanFrame]]] = []
         if tpose > 0.0:
             stand = _standing(motion)
-            parts += [(tpose, lambda time: stand), (BLEND, Blend(stand, first, BLEND).at)]
+            parts += [(tpose, lambda time: stand), (BLEND, Fade(stand, first, BLEND).at)]
         yaw, shift = 0.0, np.zeros(3)
         for turn in range(repeat):
             if turn:
                 last = moved(motion[-1], yaw, shift)
                 yaw, shift = _onward(first, last)
-                parts.append((BLEND, Blend(last, moved(first, yaw, shift), BLEND).at))
+                parts.append((BLEND, Fade(last, moved(first, yaw, shift), BLEND).at))
             parts.append((motion.duration, _moving(motion, yaw, shift)))
         self._parts = [part for _, part in parts]
         self._starts = np.concatenate([[0.0], np.cumsum([length for length, _ in parts])]).tolist()

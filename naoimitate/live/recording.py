@@ -7,6 +7,7 @@ torn end is left out. Played back, the same datagrams at the same times give the
 from __future__ import annotations
 
 import json
+import math
 import struct
 import time
 from collections.abc import Iterator
@@ -27,6 +28,10 @@ _HEAD = struct.Struct("<Bd")
 _SENDER = struct.Struct("<BHI")
 _TEXTS = struct.Struct("<BH")
 LARGEST_HEADER = 65536
+LARGEST_TIME = 1e10
+"""s on any machine's clock."""
+LONGEST_GAP = 3600.0
+"""s between two steps."""
 LONGEST_REASON = 1000
 """Bytes of a fault's reason."""
 
@@ -147,10 +152,16 @@ def _header(data: bytes) -> dict[str, Any] | None:
 
 def _events(data: bytes, at: int) -> Iterator[Datagram | Told | Step]:
     """Everything up to a torn end. Raises ValueError for what nobody has written."""
+    last = math.nan
     while at + _HEAD.size <= len(data):
         kind, moment = _HEAD.unpack_from(data, at)
         at += _HEAD.size
+        if not abs(moment) < LARGEST_TIME:
+            raise ValueError(f"a time of {moment} s")
+        if kind == STEP and not (math.isnan(last) or last <= moment <= last + LONGEST_GAP):
+            raise ValueError(f"a step at {moment} s after one at {last} s")
         if kind == STEP:
+            last = moment
             yield Step(moment)
             continue
         if kind not in (DATAGRAM, TOLD):

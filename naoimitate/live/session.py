@@ -11,15 +11,10 @@ import math
 from dataclasses import dataclass, replace
 
 from naoimitate.calib.subject import Subject, calibrate
-from naoimitate.core.errors import CalibrationError
 from naoimitate.core.frames import HumanFrame, RobotCommand
 from naoimitate.fsm.session import Action, Event, SessionFsm, State
-from naoimitate.human.mirror import mirrored_frame
 from naoimitate.imitator import Imitator
-from naoimitate.live.clock import SenderClock
-from naoimitate.live.filter import LandmarkFilter
-from naoimitate.live.sample import with_pelvis
-from naoimitate.live.tpose import TPoseWatch
+from naoimitate.live.eye import Eye
 from naoimitate.motion.builtin import relaxed, tpose
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import Settings
@@ -62,9 +57,9 @@ class Tick:
     told: tuple[tuple[Event, str], ...] = ()
 
 
-_STANDING = (State.IDLE, State.WAITING, State.RETURNING)
 _OPERATED = (State.BLENDING, State.TRACKING)
 _KEPT = (State.HOLDING, State.CLUTCHED)
+_STILL = (State.FAULT, State.STOPPED)
 
 
 class Session:
@@ -80,12 +75,13 @@ class Session:
         self.imitator = Imitator(robot, settings)
         self._live = live or SessionSettings()
         self._fsm = SessionFsm(measured=subject is not None)
-        self._watch, self._filter, self._clock = TPoseWatch(), LandmarkFilter(), SenderClock()
+        self.eye = Eye(self._live.filtered, self._live.mirror)
         self._stand_in = calibrate(tpose())
         self._still, self._tpose = relaxed(), tpose()
         self.subject = subject
         self.reason = ""
         """Why the session is in fault."""
+        self._command: RobotCommand | None = None
         self._person: HumanFrame | None = None
         self._kept: HumanFrame | None = None
         self._fresh: HumanFrame | None = None
@@ -103,7 +99,7 @@ class Session:
     @property
     def countdown(self) -> float:
         """Seconds for which the T-pose still has to be held."""
-        return self._watch.left
+        return self.eye.countdown
 
     def warm_up(self) -> None:
         """Step through postures until everything is compiled; the session begins afterwards as if never used."""
@@ -112,46 +108,33 @@ class Session:
         for frame, support in ((self._tpose, "D"), (self._still, "L"), (self._still, "D")):
             for _ in range(100):
                 self.imitator.step(frame, 0.05, support=support)
-        warm, watch = LandmarkFilter(), TPoseWatch()
+        warm = Eye()
         for k in range(20):
-            seen = warm.step(replace(self._tpose, time=0.01 * k, support=None))
-            self.imitator.step(warm.predicted(0.01 * k + 0.005, seen), 0.01)
-            watch.see(seen)
+            seen = warm.look(replace(self._tpose, time=0.01 * k, support=None))
+            self.imitator.step(warm.expected(seen, 0.01 * k + 0.005), 0.01)
+            warm.measure(seen)
 
     def start(self) -> None:
         """The robot stands in its posture ``stand``, connected."""
-        self._stand()
         self._take(Event.START)
 
     def see(self, frame: HumanFrame, arrival: float) -> None:
         """The newest frame of the operator, its time on the sender's clock (NaN: not told), and when it came."""
-        frame = with_pelvis(replace(frame, time=self._clock.moment(frame.time, arrival)))
-        if self._live.mirror:
-            frame = mirrored_frame(frame)
-        self._fresh, self._arrival = frame, arrival
+        self._fresh, self._arrival = self.eye.receive(frame, arrival), arrival
 
     def tell(self, event: Event, reason: str = "") -> None:
         """What no frame says: the operator's ``CLUTCH``, ``BODY``, ``RESET`` and ``STOP``, the robot's ``FAULT``.
 
-        reason: of a fault. After a reset the robot stands in its posture ``stand`` again.
+        reason: of a fault. A reset says that the robot stands in its posture ``stand`` again.
         """
         self._told.append((event, reason))
         action = self._take(event)
         if event is Event.CLUTCH:
-            self._watch.reset()
+            self.eye.forget()
         elif event is Event.BODY and action is not None:
             self._upper_body = not self._upper_body
         elif event is Event.FAULT and action is not None:
             self.reason = reason
-        elif event is Event.RESET and action is not None:
-            self._stand()
-
-    def _stand(self) -> None:
-        """Imitate the stand-in, from the robot's own stand."""
-        self.imitator.use(self._stand_in)
-        self.imitator.stand()
-        self._played, self._person, self.reason = "standing", None, ""
-        self._arrival = -math.inf
 
     def step(self, now: float) -> Tick:
         """The next command, at ``now`` s: ``observe``, then ``imitate``."""
@@ -170,32 +153,25 @@ class Session:
 
     def imitate(self) -> Tick:
         """The command for the moment that was observed."""
-        command = self._command(self._now, self._caused, self._dt)
+        command = self._command = self._next_command()
         if self.state is State.BLENDING and not self.imitator.blending:
             self._take(Event.BLENDED)
-        if self.state is State.RETURNING and not self.imitator.blending and command.support == "D":
+        stands = not self.imitator.blending and command.support == "D"
+        if self.state in (State.RETURNING, State.STOPPING) and stands:
             self._take(Event.STANDING)
         arrival = self._arrival if self.state is State.TRACKING else math.nan
         told, self._told = tuple(self._told), []
         return Tick(command, self.state, arrival, self._caused and self.state in _OPERATED, self._began, told)
 
     def _observe(self, frame: HumanFrame) -> None:
-        """Take a frame of the operator: filtered, watched for a T-pose, and told to the machine."""
-        self._person = self._filter.step(frame) if self._live.filtered else frame
+        """Take a frame of the operator, tell the machine, and measure who holds a T-pose."""
+        self._person = self.eye.look(frame)
         self._take(Event.FRAME)
         if self.state in (State.CALIBRATING, State.CLUTCHED):
-            held = self._watch.see(self._person)
-            if held is not None:
-                self._measure(held)
-
-    def _measure(self, held: HumanFrame) -> None:
-        """Calibrate with a T-pose that was held; one that cannot serve is waited out."""
-        self._watch.reset()
-        try:
-            self.subject = calibrate(held)
-        except CalibrationError:
-            return
-        self._take(Event.TPOSE)
+            subject = self.eye.measure(self._person)
+            if subject is not None:
+                self.subject = subject
+                self._take(Event.TPOSE)
 
     def _miss(self, now: float) -> None:
         """No frame in this step: what that means after so long."""
@@ -206,24 +182,35 @@ class Session:
             self._take(Event.LOST)
 
     def _take(self, event: Event) -> Action | None:
+        if event in (Event.LATE, Event.CLUTCH) and self.state in _OPERATED:
+            self._kept = self._expected()
         action = self._fsm.take(event)
-        if action is Action.CALIBRATE:
-            self._began = True
-        if action in (Action.BLEND, Action.CALIBRATE):
+        if action is Action.BEGIN:
+            self._begin()
+        elif action is Action.CALIBRATE:
+            self._began, self._played = True, ""
+        elif action is Action.BLEND or (action is Action.STAND and self._played == "operator"):
             self._played = ""
-        if action is Action.HOLD:
-            self._kept = self._person
         return action
 
-    def _command(self, now: float, fresh: bool, dt: float) -> RobotCommand:
-        """One step of the imitator, of whom the state says."""
+    def _begin(self) -> None:
+        """From the robot's own stand; nobody has been seen yet."""
+        self.imitator.use(self._stand_in)
+        self.imitator.stand()
+        self._played, self._person, self.reason = "standing", None, ""
+        self._arrival = -math.inf
+
+    def _next_command(self) -> RobotCommand:
+        """One step of the imitator, of whom the state says; where nothing may move, the last command again."""
+        if self.state in _STILL and self._command is not None:
+            return replace(self._command, time=self._command.time + self._dt)
         if self.state in _OPERATED or (self.state in _KEPT and self._played == "operator"):
-            assert self._person is not None and self.subject is not None
+            assert self.subject is not None
             self._play("operator", self.subject, self._live.blend_in)
-            return self.imitator.step(self._expected(now, fresh), dt)
+            return self.imitator.step(self._expected(), self._dt)
         showing = self.state is State.CALIBRATING
         self._play("T-pose" if showing else "standing", self._stand_in, self._live.blend_back)
-        return self.imitator.step(self._tpose if showing else self._still, dt)
+        return self.imitator.step(self._tpose if showing else self._still, self._dt)
 
     def _play(self, who: str, subject: Subject, duration: float) -> None:
         """Imitate somebody from now on, from where the robot is."""
@@ -233,10 +220,9 @@ class Session:
         self.imitator.turn_to(subject)
         self.imitator.blend(duration)
 
-    def _expected(self, now: float, fresh: bool) -> HumanFrame:
-        """The operator now: as seen, continued for a short while, or as last seen."""
-        person = self._kept if self.state in _KEPT else self._person
-        assert person is not None
-        if fresh or not self._live.filtered or self.state in _KEPT:
-            return person
-        return self._filter.predicted(min(now, person.time + self._live.predict), person)
+    def _expected(self) -> HumanFrame:
+        """The operator now: continued for a short while from when they were seen, or as they were kept."""
+        if self.state in _KEPT and self._kept is not None:
+            return self._kept
+        assert self._person is not None
+        return self.eye.expected(self._person, min(self._now, self._person.time + self._live.predict))

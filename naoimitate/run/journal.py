@@ -69,10 +69,14 @@ class Journal:
         if row.command.time - self._rows[0].command.time >= CHUNK:
             self._flush()
 
-    def close(self) -> Run | None:
-        """Write what is left and make the run file; None where no frame was added."""
+    def end(self) -> None:
+        """Write what is left; ``finish`` makes the run file."""
         self._flush()
         self._file.close()
+
+    def close(self) -> Run | None:
+        """Write what is left and make the run file; None where no frame was added."""
+        self.end()
         return finish(self.out)
 
     def _flush(self) -> None:
@@ -122,7 +126,8 @@ def finish(out: Path) -> Run | None:
     if not frames:
         path.unlink()
         return None
-    values = {key: np.concatenate([frame[key] for frame in frames]) for key in frames[0]}
+    shared = set(frames[0]).intersection(*frames)
+    values = {key: np.concatenate([frame[key] for frame in frames]) for key in shared}
     if "sim_fell" in values:
         values["sim_fell"] = np.asarray(values["sim_fell"].any())
     run = Run(**{key: value.item() if value.ndim == 0 else value for key, value in {**constants, **values}.items()})

@@ -34,7 +34,7 @@ STRAIGHT = 0.05
 """m off the line from hip to ankle: a knee nearer to it does not tell to which side it bends."""
 
 
-class Blend:
+class Fade:
     """The way from frame ``a`` to frame ``b`` in ``duration`` s, with minimum jerk.
 
     Pelvis, ankles and toes move straight, so that feet which stand before and after stay on the floor; every other bone
