@@ -55,8 +55,11 @@ class GravityCompensation:
             torque[follower] = 0.0
         return np.clip(torque, -robot.effort, robot.effort)
 
-    def command(self, q: Array, base_quat: Array, support: str, stiffness: float) -> Array:
-        """Servo command (J,) rad that ends up at the posture q; stiffness in N m/rad, the rest as ``torque``."""
+    def command(self, q: Array, base_quat: Array, support: str, stiffness: Array | float) -> Array:
+        """Servo command (J,) rad that ends up at the posture q.
+
+        stiffness: (J,) or one for all, N m/rad; the rest as ``torque``.
+        """
         command = q + self.torque(q, base_quat, support) / stiffness
         for leader, follower in self._robot.coupled:
             command[follower] = command[leader]

@@ -23,13 +23,13 @@ class Condition(enum.Enum):
 
     Nothing is softened: that command is a balanced pose, and a robot that has lost one motor of a leg stands in it as
     long as all others stay stiff, while a limp one falls for sure. Whether the robot can be let go of, a person sees
-    best: take hold of it, then stop. Should it fall after all, the fall latch softens it as ever."""
+    best: take hold of it, then stop. Should it fall after all, and can it tell, the fall latch softens it as ever."""
     FALLING = "falling"
-    """Soft; no command passes."""
+    """Soft; no command passes. A robot that measures neither its torso nor a fall never gets here, however it lies."""
     FALLEN = "fallen"
     """Let go of after a fall, until ``reset``."""
     EMERGENCY = "emergency stop"
-    """Let go of by ``emergency_stop``, until ``reset``."""
+    """Let go of by ``emergency_stop``, until ``reset``: stopped, softened, then limp (a simulated robot stays soft)."""
     STOPPED = "stopped"
     """Let go of in peace."""
 

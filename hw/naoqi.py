@@ -19,11 +19,11 @@ import numpy as np
 
 from naoimitate.calib.zeros import JointZeros, no_zeros
 from naoimitate.core.errors import DriverError
-from naoimitate.core.frames import SIDES, Array, RobotCommand
-from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.core.frames import RobotCommand
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.hw.naoqi_link import NaoqiLink
+from naoimitate.hw.naoqi_sender import NaoqiSender
 from naoimitate.hw.naoqi_senses import accelerometer_sign, blank, keys, state
 from naoimitate.hw.naoqi_start import (
     ON_ITS_FEET,
@@ -37,16 +37,8 @@ from naoimitate.hw.naoqi_start import (
     stand_up,
     wake,
 )
+from naoimitate.hw.servo_command import Target, servo_command, target_of
 from naoimitate.robot.model import RobotModel
-
-HEADROOM = 1.2
-"""The step is done in 1 / HEADROOM of the period: room for a tick that comes early."""
-
-MIN_FRACTION, MAX_FRACTION = 0.01, 1.0
-"""Of the maximum speed; ALMotion refuses 0."""
-
-HAND_STEP, HAND_FRACTION = 0.05, 0.5
-"""A hand is moved when its opening (0 to 1) has changed by so much, at this fraction of its speed."""
 
 SILENCE = 0.5
 """[s] without an answer after which the robot is said not to answer; ten times its slowest call on a busy network."""
@@ -93,15 +85,15 @@ class NaoqiDriver:
         self._robot, self._settings = robot, settings or NaoqiSettings()
         self._zeros, self._notice = zeros or no_zeros(robot), notice
         self._names, self._keys = list(robot.joint_names), keys(robot.joint_names)
-        self._hands = [robot.data["hands"][side] for side in SIDES] if "hands" in robot.data else []
-        self._compensation = GravityCompensation(robot) if self._settings.servo_stiffness else None
+        stiffness = self._settings.servo_stiffness
+        self._command = servo_command(robot, stiffness and stiffness * self._settings.stiffness)
         self._link: NaoqiLink | None = None
         self._thread: threading.Thread | None = None
         self._leaving: NaoqiLink | None = None
         self._halt, self._stopping = threading.Event(), threading.RLock()
         self._nonsense = ""
         self._state = blank(len(self._names), robot.postures["stand"])
-        self._target: RobotCommand | None = None
+        self._target: Target | None = None
         self._began = time.monotonic()
 
     @property
@@ -159,7 +151,7 @@ class NaoqiDriver:
 
     def write(self, command: RobotCommand) -> None:
         """Replace the command that is sent from the next period on; after ``stop`` it leads to nothing."""
-        self._target = command
+        self._target = target_of(command)
 
     def soften(self, share: float) -> None:
         """Turn the stiffness down to a share, 0 to 1, of its setting, without waiting for the robot."""
@@ -229,16 +221,13 @@ class NaoqiDriver:
             raise DriverError(INTERRUPTED)
 
     def _start_from(self, link: NaoqiLink) -> None:
-        """The robot's first state, its speeds, and no target."""
+        """The robot's first state, its sender, and no target."""
         self._began, self._target, self._nonsense = time.monotonic(), None, ""
-        limits = link.call("ALMotion", "getLimits", "Body")
-        by_name = dict(zip(link.call("ALMotion", "getBodyNames", "Body"), limits, strict=True))
-        self._speed = np.array([by_name[name][2] for name in self._names], dtype=np.float64)
         values = link.call("ALMemory", "getListData", self._keys)
         self._upright = accelerometer_sign(values)
         servos = link.call("ALMotion", "getAngles", self._names, True)
         self._state = self._sensed(servos, values)
-        self._sent, self._opening = np.array(servos, dtype=np.float64), np.full(2, np.nan)
+        self._sender = NaoqiSender(link, self._robot, self._zeros, self._command, self.period)
 
     def _run(self, link: NaoqiLink, halt: threading.Event) -> None:
         """The robot's period: send, ask, and take the answers to what was asked before.
@@ -249,7 +238,8 @@ class NaoqiDriver:
         due = time.monotonic()
         while not halt.is_set() and link.open:
             try:
-                self._send(link)
+                if self._target is not None:
+                    self._sender.send(self._target, self._state)
                 if asked is not None and all(future.done() for future in asked):
                     answers, asked = asked, None
                     self._take(*answers)
@@ -271,40 +261,6 @@ class NaoqiDriver:
     def _sensed(self, servos: Any, values: Any) -> RobotState:
         planned = UPRIGHT if self._target is None else self._target.base_quat
         return state(self._now(), servos, values, self._names, self._zeros, self._upright, planned)
-
-    def _send(self, link: NaoqiLink) -> None:
-        """The newest command, as servo angles, if there is something new in it."""
-        command = self._target
-        if command is None:
-            return
-        servos = self._servos(command)
-        step = np.abs(servos - self._sent)
-        if step.any():
-            link.ask("ALMotion", "setAngles", self._names, servos.tolist(), self._fraction(step))
-            self._sent = servos
-        self._send_hands(link, command)
-
-    def _servos(self, command: RobotCommand) -> Array:
-        """Servo angles (J,) rad: with what gravity takes, where asked for, and the specimen's zeros; in range."""
-        q = command.q
-        if self._compensation is not None and self._settings.servo_stiffness:
-            kp = self._settings.servo_stiffness * self._settings.stiffness
-            q = self._compensation.command(q, command.base_quat, command.support, kp)
-        return np.clip(self._zeros.to_servos(q), self._robot.lower, self._robot.upper)
-
-    def _fraction(self, step: Array) -> float:
-        """Fraction of the maximum speed with which the largest step (J,) rad takes a period."""
-        needed = HEADROOM * float((step / self._speed).max()) / self.period
-        return min(max(needed, MIN_FRACTION), MAX_FRACTION)
-
-    def _send_hands(self, link: NaoqiLink, command: RobotCommand) -> None:
-        if not self._hands or command.hand_opening is None:
-            return
-        for side, name in enumerate(self._hands):
-            opening, was = float(command.hand_opening[side]), float(self._opening[side])
-            if opening == opening and not abs(opening - was) < HAND_STEP:
-                link.ask("ALMotion", "setAngles", [name], [opening], HAND_FRACTION)
-                self._opening[side] = opening
 
     def _now(self) -> float:
         return time.monotonic() - self._began

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
-from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import RobotState
+from naoimitate.hw.servo_command import Target, servo_command, target_of
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.model import Scene
 from naoimitate.sim.physics import Physics
@@ -21,16 +20,6 @@ from naoimitate.sim.sensors import roll_pitch
 from naoimitate.sim.settings import SimSettings
 
 DEFAULT = SimSettings()
-
-
-class _Target(NamedTuple):
-    """What the servos follow: the part of a RobotCommand that a body can carry out."""
-
-    q: Array
-    base_pos: Array
-    base_quat: Array
-    support: str
-    hand_opening: Array | None = None
 
 
 class MujocoDriver:
@@ -52,10 +41,10 @@ class MujocoDriver:
     ) -> None:
         self._settings = settings
         self._physics = Physics(robot, settings, scene)
-        self._compensation = GravityCompensation(robot) if compensation else None
+        self._servos = servo_command(robot, settings.stiffness if compensation else None)
         self._real_time = real_time
         stand = robot.postures["stand"]
-        self._stand = self._target = _Target(stand, *stand_on_floor(robot, stand), "D")
+        self._stand = self._target = Target(stand, *stand_on_floor(robot, stand), "D")
         self._halt = threading.Event()
         self._thread: threading.Thread | None = None
         self._place()
@@ -97,9 +86,7 @@ class MujocoDriver:
     def write(self, command: RobotCommand) -> None:
         """Replace the command that the servos follow from the next period on."""
         if not self._held:
-            self._target = _Target(
-                command.q, command.base_pos, command.base_quat, command.support, self._kept(command.hand_opening)
-            )
+            self._target = target_of(command)._replace(hand_opening=self._kept(command.hand_opening))
 
     def _kept(self, opening: Array | None) -> Array | None:
         """Openings (2,) with the last known ones in place of NaN: a command that is replaced before the next period
@@ -118,7 +105,7 @@ class MujocoDriver:
         self._held = True
 
     def stop(self) -> None:
-        """Stop the clock; the robot stays as it is."""
+        """Stop the clock; the robot stays as it is, there is nothing that could fall."""
         self._halt.set()
         if self._thread is not None:
             self._thread.join()
@@ -146,19 +133,16 @@ class MujocoDriver:
 
     def _tick(self) -> None:
         target = self._target
-        servos = target.q
-        if self._compensation is not None:
-            servos = self._compensation.command(target.q, target.base_quat, target.support, self._settings.stiffness)
-        self._physics.advance(servos, self.period, target.hand_opening)
+        self._physics.advance(self._servos(target, self._state), self.period, target.hand_opening)
         self._observe(target)
 
-    def _observe(self, target: _Target) -> None:
+    def _observe(self, target: Target) -> None:
         """Take what other threads may ask for; each is one value that is replaced as a whole."""
         self._snapshot = self._physics.time, np.array(self._physics.data.qpos)
         self._opening = self._physics.opening
         self._state = self._measure(target)
 
-    def _measure(self, target: _Target) -> RobotState:
+    def _measure(self, target: Target) -> RobotState:
         physics = self._physics
         pos, quat = physics.base_pos, physics.base_quat
         tipped = has_tipped(tilt(target.base_quat, quat), pos[2] / target.base_pos[2])

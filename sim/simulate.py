@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +11,7 @@ import numpy.typing as npt
 from naoimitate.core.falling import has_fallen, has_tipped, swing_load, tilt
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.geometry import convex_hull, polygon_margin
-from naoimitate.hw.compensation import GravityCompensation
-from naoimitate.hw.driver import RobotState
+from naoimitate.hw.servo_command import ServoCommand, Target, servo_command
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance, disturb_model, disturbed_settings
 from naoimitate.sim.disturbance_line import CommandLine
@@ -25,20 +23,6 @@ DEFAULT = SimSettings()
 
 SETTLE_TIME = 1.0
 """How long the robot stands in its first pose before the motion starts, s: servos and soles reach equilibrium."""
-
-
-class Target(NamedTuple):
-    """One frame of a plan, as a ``RobotCommand`` has it: q (J,) rad, torso (3,) m and (4,), support."""
-
-    q: Array
-    base_pos: Array
-    base_quat: Array
-    support: str
-
-
-Control = Callable[[Target, RobotState], Array]
-"""Turns a frame of the plan and what the robot measures at that moment into servo angles (J,) rad: the place of
-gravity compensation, and of a loop that is closed over the sensors."""
 
 
 @dataclass(frozen=True)
@@ -86,7 +70,7 @@ def simulate(
     settings: SimSettings = DEFAULT,
     progress: Callable[[float], None] | None = None,
     disturbance: Disturbance | None = None,
-    control: Control | None = None,
+    control: ServoCommand | None = None,
     until_tipped: bool = False,
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
@@ -108,7 +92,7 @@ def simulate(
     physics = Physics(robot, settings)
     disturb_model(physics.model, physics.data, physics.torso, disturbance)
     physics.place(*plan[0][:3], openings[0])
-    control = control or driver_control(robot, stiffness, compensation=compensation)
+    control = control or servo_command(robot, stiffness if compensation else None)
     samples = []
     for target in _play(physics, plan, time - time[0], openings, disturbance, control):
         samples.append(_sample(robot, physics, target.support))
@@ -124,16 +108,13 @@ def simulate(
     return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
 
 
-def driver_control(robot: RobotModel, stiffness: float, *, compensation: bool = True) -> Control:
-    """What the driver does to a frame: gravity compensation for the robot as its model says, or nothing."""
-    if not compensation:
-        return lambda target, state: target.q
-    gravity = GravityCompensation(robot)
-    return lambda target, state: gravity.command(target.q, target.base_quat, target.support, stiffness)
-
-
 def _play(
-    physics: Physics, plan: list[Target], moments: Array, openings: Array, disturbance: Disturbance, control: Control
+    physics: Physics,
+    plan: list[Target],
+    moments: Array,
+    openings: Array,
+    disturbance: Disturbance,
+    control: ServoCommand,
 ) -> Iterator[Target]:
     """Let time pass up to each frame of a plan in turn; moments: (T,) s from the first frame."""
     sensors = NoisySensors(physics, disturbance)

@@ -156,8 +156,8 @@ def test_motors_hold_within_a_tenth_of_a_second_when_the_driver_dies(nao: RobotM
         q[nao.joint("HeadYaw")] = 2.0
         it.driver.write(command(nao, q))
         time.sleep(0.05)
-        assert it.driver._link is not None
-        it.driver._link.send = lambda frames: None  # type: ignore[method-assign]  # as if it were killed
+        assert it.driver._sender is not None
+        it.driver._sender.link.send = lambda frames: None  # type: ignore[method-assign]  # as if it were killed
         time.sleep(0.2)
         held = positions(it)
         assert {motor.status for motor in it.stub.motors.values()} == {"holding"}
@@ -169,8 +169,8 @@ def test_motors_hold_within_a_tenth_of_a_second_when_the_driver_dies(nao: RobotM
 def test_a_robot_that_still_holds_itself_is_taken_over_without_letting_go(nao: RobotModel) -> None:
     with rig(nao, compensation=False) as it:
         it.driver.connect()
-        assert it.driver._link is not None
-        it.driver._link.send = lambda frames: None  # type: ignore[method-assign]
+        assert it.driver._sender is not None
+        it.driver._sender.link.send = lambda frames: None  # type: ignore[method-assign]
         assert wait_for(lambda: it.stub.motors[1].status == "holding")
         it.frames()
         second = CanDriver(nao, interface="virtual", channel=it.channel, settings=QUICK, compensation=False)

@@ -126,11 +126,11 @@ def test_the_operator_stops_a_robot_in_fault_and_connects_it_again(nao: RobotMod
 def test_a_pause_of_the_computer_ends_nothing(nao: RobotModel, gate: CommandGate) -> None:
     """The motors hold by themselves meanwhile, and follow again."""
     with living(nao, gate) as life:
-        assert life.it.driver._link is not None
-        send = life.it.driver._link.send
-        life.it.driver._link.send = lambda frames: None  # type: ignore[method-assign]
+        assert life.it.driver._sender is not None
+        send = life.it.driver._sender.link.send
+        life.it.driver._sender.link.send = lambda frames: None  # type: ignore[method-assign]
         time.sleep(0.3)
-        life.it.driver._link.send = send  # type: ignore[method-assign]
+        life.it.driver._sender.link.send = send  # type: ignore[method-assign]
         before = life.guard.status.accepted
         assert life.until(lambda status: status.accepted > before + 50)
         assert life.guard.status.condition is Condition.LIVE

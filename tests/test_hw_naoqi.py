@@ -25,7 +25,8 @@ from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import RobotCommand
 from naoimitate.hw.driver import Driver
 from naoimitate.hw.guarded import Condition, GuardedDriver
-from naoimitate.hw.naoqi import HEADROOM, NaoqiDriver, NaoqiSettings
+from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings
+from naoimitate.hw.naoqi_sender import HEADROOM
 from naoimitate.robot.model import Array, RobotModel
 from naoimitate.sim.placement import stand_on_floor
 

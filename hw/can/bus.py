@@ -8,8 +8,17 @@ import logging
 import can
 
 from naoimitate.core.errors import DriverError
+from naoimitate.robot.model import RobotModel
+
+USUAL_BITRATE = 1_000_000
+"""bit/s of a CAN bus in a robot, where robot.yaml says nothing: the fastest that classic CAN has."""
 
 logging.getLogger("can").addHandler(logging.NullHandler())  # its backends warn at import about drivers nobody asked for
+
+
+def bitrate_of(robot: RobotModel) -> int:
+    """bit/s of the bus in a robot with a section ``can`` in its robot.yaml."""
+    return int(robot.data["can"].get("bitrate", USUAL_BITRATE))
 
 
 def open_bus(interface: str, channel: str, bitrate: int) -> can.BusABC:

@@ -41,7 +41,7 @@ def can_stub(
 
     They answer commands, move with their speed limits, and hold when no commands come for 0.1 s.
     """
-    from naoimitate.hw.can.bus import open_bus
+    from naoimitate.hw.can.bus import bitrate_of, open_bus
     from naoimitate.hw.can.stub import CanStub, motor_numbers
     from naoimitate.hw.can.stub_faults import parse_fault
     from naoimitate.robot import load_robot
@@ -49,7 +49,7 @@ def can_stub(
     model = load_robot(robot, robot_version)
     motors = motor_numbers(model)
     wanted = [parse_fault(text, motors) for text in faults]
-    bus = open_bus(interface, channel, int(model.data["can"].get("bitrate", 1_000_000)))
+    bus = open_bus(interface, channel, bitrate_of(model))
     with bus:
         stub = CanStub(model, bus, wanted, database, posture)
         stub.start()
