@@ -27,7 +27,8 @@ class RobotState:
     angles: (2,) rad, roll and pitch of the torso from the inertial board.
     gyro: (3,) rad/s and accelerometer: (3,) m/s^2 in the torso frame; an upright robot at rest reads (0, 0, +9.81).
     fsr: (2, 4) N, force sensors of the left and right foot, columns as ``FSR_NAMES``.
-    fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height; False where neither is measured.
+    fell: the torso leans over 45 deg away from its commanded direction, or has sunk under 60 % of its commanded height;
+    False where neither is measured.
     base_pos: (3,) m and base_quat: (4,) torso in the world, where the driver knows them (simulation), else None.
     alarms: what the robot complains about while it still obeys, a short sentence each: a warm motor, a low battery, a
     damaged frame. faults: why it cannot be commanded any more, likewise: a motor that is off, silent or blocked.

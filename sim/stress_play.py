@@ -9,10 +9,11 @@ import numpy.typing as npt
 
 from naoimitate.core.falling import HEIGHT_LIMIT, TILT_LIMIT, has_tipped
 from naoimitate.core.frames import Array
+from naoimitate.hw.servo_command import ServoCommand
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.simulate import Control, SimResult, simulate
+from naoimitate.sim.simulate import SimResult, simulate
 
 TIPPED, SANK, LOADED = "tipped", "sank", "swing foot loaded"
 """What can fail; see ``core.falling``."""
@@ -62,7 +63,7 @@ def play(
     disturbance: Disturbance,
     *,
     known_stiffness: bool = False,
-    control: Control | None = None,
+    control: ServoCommand | None = None,
 ) -> Outcome:
     """Play a plan under a disturbance until its end or until the robot lies.
 

@@ -10,6 +10,7 @@ import pytest
 
 from naoimitate.core.errors import RobotModelError
 from naoimitate.hw.driver import RobotState
+from naoimitate.hw.servo_command import Target
 from naoimitate.robot import RobotModel
 from naoimitate.robot.model import Array
 from naoimitate.sim.disturbance import PUSH_TIME, Disturbance, disturb_model, disturbed_settings
@@ -19,7 +20,7 @@ from naoimitate.sim.model import torque_limits
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.placement import stand_on_floor
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.simulate import SimResult, Target, simulate
+from naoimitate.sim.simulate import SimResult, simulate
 
 PERIOD = 0.01
 
