@@ -196,6 +196,27 @@ def test_a_session_that_is_killed_keeps_all_but_its_last_second(tmp_path: Path) 
     assert len(steps) >= len(run)
 
 
+def test_a_run_that_was_cut_off_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "run.npz"
+    journal_path(out).write_bytes(b"what a killed program left")
+    assert command(["live", "--source", "replay:builtin:wave", "--driver", "none", "--out", str(out)]) == 2
+    assert f"recover {out}" in capsys.readouterr().err
+    assert journal_path(out).read_bytes() == b"what a killed program left"
+
+
+def test_a_watcher_that_fails_is_told_of_and_the_robot_goes_on(nao: RobotModel) -> None:
+    rig, said = Rig(nao), list[str]()
+
+    def full_disk(beat: Beat) -> None:
+        raise OSError("No space left on device")
+
+    loop = Loop(rig.session, rig.driver, [full_disk, rig.beats.append], said.append)
+    loop.run(listen(rig.session, rig.stream, rig.receiver, 0.01), duration=0.3)
+    rig.receiver.close()
+    assert said == ["No space left on device"]
+    assert len(rig.beats) > 10 and rig.beats[-1].tick.state.value == "stopped"
+
+
 @pytest.mark.parametrize("content", [b"", b"junk", b"\xff" * 100])
 def test_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> None:
     out = tmp_path / "run.npz"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,9 +11,12 @@ import numpy as np
 import pytest
 
 from naoimitate.cli import run as command
+from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import CalibrationError, StreamError
 from naoimitate.fsm.session import Event
-from naoimitate.live.loop import Beat, Turn
+from naoimitate.hw.guarded import GuardedDriver
+from naoimitate.hw.none import NoDriver
+from naoimitate.live.loop import Beat, Loop, Turn
 from naoimitate.live.measure import measure_operator
 from naoimitate.live.performance import Performance
 from naoimitate.live.playback import Playback
@@ -73,6 +77,24 @@ def test_a_recording_plays_again_bit_for_bit_with_all_that_was_said(nao: RobotMo
     assert np.array_equal([t.tick.command.q for t in after], [t.tick.command.q for t in before])
     states = {t.tick.state.value for t in after}
     assert states == {"calibrating", "blending", "tracking", "clutched", "fault"}
+
+
+def test_the_driver_of_a_replay_follows_the_recording_through_a_reset(nao: RobotModel, tmp_path: Path) -> None:
+    before = recorded(nao, tmp_path / "a.rec", Setup())
+    session, now = Setup().session(nao), [100.0]
+
+    def told_time(turns: Iterator[Turn]) -> Iterator[Turn]:
+        for turn in turns:
+            now[0] = turn.now
+            yield turn
+
+    driver = GuardedDriver(NoDriver(nao), CommandGate(nao), clock=lambda: now[0])
+    driver.connect()
+    beats: list[Beat] = []
+    turns = told_time(play(read_recording(tmp_path / "a.rec"), session, Stream(JSON, ())))
+    Loop(session, driver, [beats.append], live=False).run(turns, hurried=lambda: True)
+    assert not driver.status.refused
+    assert np.array_equal([b.tick.command.q for b in beats[: len(before)]], [t.tick.command.q for t in before])
 
 
 def test_a_recording_is_played_as_it_was_set_up_unless_the_operator_says_otherwise(
