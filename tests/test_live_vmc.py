@@ -360,3 +360,14 @@ def test_mutated_packets_do_no_harm(seed, changes, cut):
     if cut < len(data) // 2:
         del data[len(data) - cut :]
     survives(bytes(data))
+
+
+def test_a_datagram_of_countless_messages_or_arguments_is_soon_read():
+    bone = osc.message("/VMC/Ext/Bone/Pos", "Hips", *[0.1] * 6, 1.0)
+    empty = osc.BUNDLE + osc.IMMEDIATELY
+    for content in (bone, empty, b"/\0\0\0"):
+        crowd = osc.bundles([content] * (osc.MESSAGES + 1), 65000)[0]
+        with pytest.raises(DatagramError, match="more than 512 messages"):
+            VMC.decoder().feed(crowd)
+    more = osc.message("/VMC/Ext/Bone/Pos", "Hips", *[0.1] * 6, 1.0, *[1.0] * 10000)
+    assert osc.arguments(more, "sfffffff") == osc.arguments(bone, "sfffffff")

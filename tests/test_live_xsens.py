@@ -521,3 +521,12 @@ def test_the_largest_datagrams_stay_small_in_memory():
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1_000_000
+
+
+@pytest.mark.parametrize("lists", [(mxtp.LONGEST_LIST + 1, 0), (0, mxtp.LONGEST_LIST + 1)])
+def test_a_scaling_longer_than_any_persons_is_refused(lists):
+    origins, points = lists
+    payload = struct.pack(">I", origins) + struct.pack(">i3f", 0, 0.0, 0.0, 0.0) * origins
+    payload += struct.pack(">I", points) + struct.pack(">HHiI3f", 1, 1, 0, 0, 0.0, 0.0, 0.0) * points
+    with pytest.raises(DatagramError, match="longer than any person's"):
+        mxtp.read_scaling(payload)

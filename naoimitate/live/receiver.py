@@ -1,10 +1,17 @@
-"""Datagrams from the network: one UDP socket, read without waiting."""
+"""Datagrams from the network: one UDP socket, read without waiting.
+
+A datagram's arrival is when the system got it, not when it is read (Linux; elsewhere they are one). The system's stamp
+is of a clock that may be set while we listen, so it is believed only between what is known anyway: the datagram came
+after the last time that none was there, less than a second ago, and not in the future.
+"""
 
 from __future__ import annotations
 
 import errno
 import select
 import socket
+import struct
+import sys
 import time
 from typing import NamedTuple, Protocol
 
@@ -15,8 +22,15 @@ LARGEST = 65536
 """Bytes of the largest datagram."""
 BUFFER = 1 << 21
 """Bytes that the system may keep for us: a quarter of a second of the largest streams."""
-MOST = 256
-"""Datagrams read at a time: a flood does not keep the robot waiting."""
+MOST = 4
+"""Datagrams read at a time,"""
+ENOUGH = 16384
+"""and bytes after which no more are: whoever takes them looks at the clock in between, whatever a flood brings."""
+OLDEST = 1.0
+"""[s] that a datagram may have waited for us."""
+_STAMP = 35
+"""SO_TIMESTAMPNS of Linux (asm-generic/socket.h): the moment of arrival comes with every datagram."""
+_TIMESPEC = struct.Struct("@ll")
 
 
 class Datagram(NamedTuple):
@@ -54,6 +68,10 @@ class Receiver:
             self._socket.close()
             raise StreamError(_why(error, bind, port)) from error
         self._socket.setblocking(False)
+        self._stamped = sys.platform == "linux"
+        if self._stamped:
+            self._socket.setsockopt(socket.SOL_SOCKET, _STAMP, 1)
+        self._empty = time.monotonic()
         self.port: int = self._socket.getsockname()[1]
         self.ended = False
 
@@ -62,17 +80,35 @@ class Receiver:
         return bool(select.select([self._socket], [], [], max(timeout, 0.0))[0])
 
     def read(self) -> list[Datagram]:
-        """What has come since the last call."""
+        """What has come since the last call, the oldest first; of much only the beginning."""
         found: list[Datagram] = []
-        while len(found) < MOST:
+        size = 0
+        while len(found) < MOST and size < ENOUGH:
+            before = time.monotonic()
             try:
-                payload, address = self._socket.recvfrom(LARGEST)
+                payload, arrival, address = self._receive()
             except BlockingIOError:
+                self._empty = before
                 break
-            except OSError:  # an error of an earlier packet, told by the system: nothing has come
-                continue
-            found.append(Datagram(time.monotonic(), (str(address[0]), int(address[1])), payload))
+            except OSError:  # an error of an earlier packet, or a lasting one: nothing has come
+                break
+            size += len(payload)
+            found.append(Datagram(arrival, (str(address[0]), int(address[1])), payload))
         return found
+
+    def _receive(self) -> tuple[bytes, float, tuple[str, int]]:
+        """The next datagram, when it came, and from whom."""
+        if not self._stamped:
+            payload, address = self._socket.recvfrom(LARGEST)
+            return payload, time.monotonic(), address
+        payload, notes, _, address = self._socket.recvmsg(LARGEST, socket.CMSG_SPACE(_TIMESPEC.size))
+        now = time.monotonic()
+        for level, kind, data in notes:
+            if level == socket.SOL_SOCKET and kind == _STAMP and len(data) == _TIMESPEC.size:
+                seconds, nanoseconds = _TIMESPEC.unpack(data)
+                age = time.time() - seconds - 1e-9 * nanoseconds
+                return payload, min(max(now - age, self._empty, now - OLDEST), now), address
+        return payload, now, address
 
     def close(self) -> None:
         """Listen no more."""

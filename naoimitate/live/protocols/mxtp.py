@@ -30,6 +30,8 @@ FINGERS = 40
 """Finger segments after body and props, the left hand's 20 first."""
 POSE_BYTES = 32
 MAGIC = b"MXTP"
+LONGEST_LIST = 512
+"""Segments, or points of them, of a scaling datagram; a person with fingers has 63 and a few points on each."""
 LAST = 0x80
 """Bit of the datagram counter that marks the last part of a sample."""
 _HEADER = struct.Struct(">6sIBBIBBBBHH")
@@ -144,10 +146,10 @@ def read_meta(payload: bytes) -> dict[str, str]:
 def read_scaling(payload: bytes) -> Scaling:
     """A part of the null pose; a list of points may be missing. Raises DatagramError when it is cut off."""
     reader, origins, points = _Reader(payload), {}, {}
-    for _ in range(reader.number(">I")):
+    for _ in range(reader.count()):
         name = reader.text()
         origins[name] = reader.vector()
-    for _ in range(reader.number(">I") if reader.left else 0):
+    for _ in range(reader.count() if reader.left else 0):
         segment, _point = reader.number(">H"), reader.number(">H")
         name, _flags = reader.text(), reader.number(">I")
         points[segment, name] = reader.vector()
@@ -183,6 +185,13 @@ class _Reader:
 
     def number(self, form: str) -> int:
         return int(self._take(form)[0])
+
+    def count(self) -> int:
+        """Raises DatagramError where a list is longer than any of MVN's."""
+        count = self.number(">I")
+        if count > LONGEST_LIST:
+            raise DatagramError(f"a list of {count} in an MXTP datagram is longer than any person's: choose Xsens MVN")
+        return count
 
     def vector(self) -> tuple[float, float, float]:
         x, y, z = self._take(">3f")

@@ -1,7 +1,7 @@
-"""OSC 1.0 packets to messages, within bounds; python-osc reads and builds the messages themselves.
+"""OSC 1.0 packets to messages, within bounds; python-osc builds the messages.
 
-Bundles are opened here, because python-osc follows any nesting and any element size, and takes arguments that were cut
-off as zero.
+They are read here, because python-osc follows any nesting and any element size, takes arguments that were cut off as
+zero, and reads all of however many.
 """
 
 from __future__ import annotations
@@ -9,7 +9,6 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 
 from naoimitate.core.errors import DatagramError
@@ -17,8 +16,8 @@ from naoimitate.core.errors import DatagramError
 BUNDLE = b"#bundle\0"
 NESTING = 4
 """Bundles in bundles; senders of motion do not nest at all."""
-MESSAGES = 1024
-"""Messages of a datagram; a person with fingers and a face has some 120."""
+MESSAGES = 512
+"""Messages and bundles of a datagram; a person with fingers and a face has some 120."""
 IMMEDIATELY = b"\0\0\0\0\0\0\0\1"
 _SIZES = {"i": 4, "f": 4}
 
@@ -29,10 +28,11 @@ def messages(datagram: bytes) -> list[bytes]:
     Raises DatagramError when it is no OSC, cut off, or nested or filled beyond reason.
     """
     found: list[bytes] = []
-    for message in _opened(datagram, NESTING):
-        found.append(message)
-        if len(found) > MESSAGES:
+    for count, message in enumerate(_opened(datagram, NESTING)):
+        if count > MESSAGES:
             raise DatagramError(f"an OSC datagram has more than {MESSAGES} messages: no sender of motion needs so many")
+        if message[:1] == b"/":
+            found.append(message)
     return found
 
 
@@ -42,9 +42,9 @@ def address_of(message: bytes) -> str:
 
 
 def arguments(message: bytes, types: str) -> list[float | str]:
-    """Arguments of a packed message that has at least these types (of ``s``, ``f``, ``i``; strings first).
+    """The arguments of a packed message that has these types (of ``s``, ``f``, ``i``; strings first).
 
-    More numbers may follow them and are given, too. Raises DatagramError for others, or when bytes are missing.
+    More numbers may follow them. Raises DatagramError for others, or when bytes are missing.
     """
     address, at = _string(message, 0)
     tags, at = _string(message, at)
@@ -52,18 +52,14 @@ def arguments(message: bytes, types: str) -> list[float | str]:
         raise DatagramError(
             f"{address} has arguments {tags[1:20]!r}, not {types!r}: choose the sender's VMC protocol 2"
         )
-    needed = 0
-    for tag in tags[1:]:
-        if tag == "s":
-            _, at = _string(message, at)
-        else:
-            needed += _SIZES[tag]
-    if at + needed > len(message):
+    found: list[float | str] = []
+    numbers = types.lstrip("s")
+    for _ in range(len(types) - len(numbers)):
+        text, at = _string(message, at)
+        found.append(text)
+    if at + sum(_SIZES[tag] for tag in numbers) > len(message):
         raise DatagramError(f"the arguments of {address} are cut off: look for loss on the way")
-    try:
-        return list(OscMessage(message).params)
-    except Exception as error:  # python-osc names no list of what it raises
-        raise DatagramError(f"{address} cannot be read: look for damage on the way") from error
+    return [*found, *struct.unpack_from(">" + numbers, message, at)]
 
 
 def message(address: str, *values: float | str) -> bytes:
@@ -85,8 +81,9 @@ def bundles(packed: list[bytes], largest: int) -> list[bytes]:
 
 
 def _opened(packet: bytes, nesting: int) -> Iterator[bytes]:
+    """A packet, and if it is a bundle all that is in it, bundles and messages."""
+    yield packet
     if packet[:1] == b"/":
-        yield packet
         return
     if packet[: len(BUNDLE)] != BUNDLE:
         raise DatagramError("this is no OSC datagram: choose the --source that fits the sender")

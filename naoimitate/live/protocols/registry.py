@@ -10,8 +10,3 @@ from naoimitate.live.sample import StreamProtocol
 
 PROTOCOLS: dict[str, StreamProtocol] = {protocol.name: protocol for protocol in (XSENS, VMC, ROKOKO, JSON)}
 """Protocols by the names that ``--source`` and ``--protocol`` take."""
-
-
-def looks_like(datagram: bytes) -> StreamProtocol | None:
-    """The protocol that a datagram seems to be of, for a clear word about a wrong ``--source``; None when of none."""
-    return next((protocol for protocol in PROTOCOLS.values() if protocol.recognises(datagram)), None)
