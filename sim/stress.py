@@ -85,7 +85,7 @@ def _push(level: float, random: np.random.Generator) -> Mapping[str, Any]:
 LATEST = 0.9
 """Pushes and losses begin no later than this share of the motion: what they do must have time to show."""
 
-PUSH = 0.3
+PUSH = 0.5
 """Largest impulse of the suite's pushes, N s; see docs/stress.md."""
 
 
