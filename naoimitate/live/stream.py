@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from naoimitate.core.errors import DatagramError
-from naoimitate.core.frames import LANDMARK, SIDES
+from naoimitate.core.frames import LANDMARK, SIDES, HumanFrame
 from naoimitate.live.order import Order
 from naoimitate.live.sample import Decoder, Sample, StreamProtocol
 
@@ -23,7 +23,7 @@ SILENCE = 1.0
 """[s] without a person after which another sender may take over."""
 SENDERS = 8
 """Senders that are decoded at a time while none shows a person; who spoke longest ago makes room."""
-RECENT = 512
+RECENT = 256
 """Arrivals that jitter is measured on."""
 RATED = 1.0
 """[s] before now in which the frames came that the rate is measured on."""
@@ -152,9 +152,9 @@ class Stream:
     def _keep(self, address: Address, decoder: Decoder) -> None:
         """Keep the decoder of whoever speaks, and of no crowd; that of the sender stays."""
         self._decoders[address] = decoder
-        self._decoders.move_to_end(address)
-        if self.sender in self._decoders:
-            self._decoders.move_to_end(self.sender)
+        for kept in (address, self.sender):
+            if kept is not None and kept in self._decoders:
+                self._decoders.move_to_end(kept)
         if len(self._decoders) > SENDERS:
             self._decoders.popitem(last=False)
 
@@ -168,12 +168,12 @@ class Stream:
 
     def _see(self, arrival: float, address: Address, sample: Sample) -> None:
         """A frame of our person: who shows somebody is listened to from now on."""
-        known = np.isfinite(sample.frame.landmarks[_NEEDED]).all(axis=1)
-        if address != self.sender and known.any():
+        missing = _missing(sample.frame)
+        self._look(arrival, missing)
+        if address != self.sender and len(missing) < len(NEEDED):
             self.sender = address
             self._order.begin()
             self._decoders = OrderedDict({address: self._decoders[address]})
-        self._look(arrival, tuple(name for name, there in zip(NEEDED, known, strict=True) if not there))
         if address != self.sender:
             return
         self._heard = arrival
@@ -199,3 +199,11 @@ class Stream:
         self.counts.late, self.counts.lost = self._order.late, self._order.lost
         self.counts.restarts = self._order.restarts
         return used
+
+
+def _missing(frame: HumanFrame) -> tuple[str, ...]:
+    """The needed landmarks that a frame lacks."""
+    rows = frame.landmarks[_NEEDED]
+    if np.isfinite(rows.sum()):
+        return ()
+    return tuple(name for name, row in zip(NEEDED, rows, strict=True) if not np.isfinite(row).all())
