@@ -56,9 +56,9 @@ def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Record
     feed, driver = rig.feed, rig.driver
     with ExitStack() as ends:
         signals = ends.enter_context(Signals(driver.emergency_stop))
-        ends.callback(lambda: click.echo("\n".join(_summary(rig))))
+        ends.callback(lambda: _say(_summary(rig)))
         writer = Writer(out, rig.session, driver, rig.robot, feed.name)
-        ends.callback(lambda: [click.echo(line) for line in writer.close()])
+        ends.callback(lambda: _say(writer.close()))
         if recorder is not None:
             ends.callback(recorder.close)
         ends.callback(feed.close)
@@ -103,6 +103,11 @@ def _run(rig: Rig, loop: Loop, turns: Iterator[Turn], keys: Keys, signals: Signa
     with Panel(rig.session, rig.feed.stream, rig.driver, rig.gate) as panel:
         loop.watch.append(panel.take)
         loop.run(turns, duration, ended, hurried)
+
+
+def _say(lines: list[str]) -> None:
+    for line in lines:
+        click.echo(line)
 
 
 def _complain(sentence: str) -> None:
