@@ -162,9 +162,11 @@ def _wanted(kinds: dict[str, Kind], plans: int, options: dict[str, Any]) -> Iter
         yield from ((options["only"] or ALL, options["number"], plan) for plan in range(plans))
         return
     draws = options["draws"] or 200
-    parts = {options["only"]: draws} if options["only"] else {name: max(1, draws // len(kinds)) for name in kinds}
-    for part, count in (parts if options["only"] else parts | {ALL: draws}).items():
-        yield from ((part, number, number % plans) for number in range(count))
+    singles = dict.fromkeys(kinds, max(1, draws // len(kinds)))
+    parts = {options["only"]: draws} if options["only"] else singles | {ALL: draws}
+    for turn, (part, count) in enumerate(parts.items(), 1):
+        first = len(parts) - turn  # so that few draws of each part still see all motions
+        yield from ((part, number, (first + number) % plans) for number in range(count))
 
 
 def _draw_table(rows: Sequence[Row]) -> Table:
