@@ -81,7 +81,8 @@ def conduct(rig: Rig, duration: float | None, out: Path | None, recorder: Record
             signals.polled = True  # what follows is done to its end
         if signals.count:
             click.echo("ended by the operator", err=True)
-    if complaint := feed.stream.complaint():
+    complaint = feed.stream.complaint()
+    if complaint and rig.session.subject is None:
         raise StreamError(complaint)
 
 
@@ -127,8 +128,9 @@ class Notices:
         state = beat.tick.state.value
         why = self._session.reason if beat.tick.state is State.FAULT else self._session.eye.complaint
         state += f": {why}" if why else ""
-        if time.monotonic() - self._begin > PATIENCE and not self._feed.stream.counts.frames:
-            state = self._feed.stream.complaint() or f"nothing comes: still {self._feed.ready}"
+        if time.monotonic() - self._begin > PATIENCE:
+            nothing = "" if self._feed.stream.counts.frames else f"nothing comes: still {self._feed.ready}"
+            state = self._feed.stream.complaint() or nothing or state
         if state != self._said:
             self._said = state
             click.echo(state, err=True)

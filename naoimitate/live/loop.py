@@ -191,7 +191,7 @@ def _receive(stream: Stream, source: Source, last: float, period: float, record:
     while True:
         now = time.monotonic()
         fresh = stream.counts.frames != before
-        if now >= due or (fresh and now >= soonest):
+        if now >= due or (fresh and now >= soonest and not source.wait(0.0)):
             return
         source.wait((soonest if fresh else due) - now)
         for datagram in source.read():

@@ -12,6 +12,7 @@ import numpy as np
 from rich.console import Console
 from rich.live import Live
 from rich.table import Table
+from rich.text import Text
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.frames import RobotCommand
@@ -70,7 +71,7 @@ class Panel:
         """Everything at a glance."""
         table = Table(show_header=False, title="naoimitate live", caption=HELP)
         for row in self._rows():
-            table.add_row(*row)
+            table.add_row(*map(Text, row))  # as it is: what a sender says may look like markup
         return table
 
     def _rows(self) -> list[tuple[str, str]]:
@@ -90,7 +91,8 @@ class Panel:
             margin = self._gate.feet(c.q, c.base_pos, c.base_quat, c.support).margin
             rows.append(("balance", f"{1e3 * margin:.0f} mm inside the feet"))
             rows.append(("given up", c.given_up.name or "nothing"))
-        rate, jitter = self._stream.rate, 1e3 * self._stream.jitter
+        rate = self._stream.rate if beat is None else self._stream.rate_at(beat.turn.now)
+        jitter = 1e3 * self._stream.jitter
         rows.append(("stream", f"{rate:.0f} Hz, jitter {jitter:.1f} ms, {counts.lost} lost, {counts.late} late"))
         rows.append(("other packets", f"{counts.damaged} damaged, {counts.foreign} of other senders"))
         complaint = self._stream.complaint()
