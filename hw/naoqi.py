@@ -22,6 +22,7 @@ from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import RobotCommand
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
+from naoimitate.hw.learning import LearningCompensation
 from naoimitate.hw.naoqi_link import NaoqiLink
 from naoimitate.hw.naoqi_sender import NaoqiSender
 from naoimitate.hw.naoqi_senses import accelerometer_sign, blank, keys, state
@@ -37,7 +38,7 @@ from naoimitate.hw.naoqi_start import (
     stand_up,
     wake,
 )
-from naoimitate.hw.servo_command import Target, servo_command, target_of
+from naoimitate.hw.servo_command import ServoCommand, Target, servo_command, target_of
 from naoimitate.robot.model import RobotModel
 
 SILENCE = 0.5
@@ -69,6 +70,9 @@ class NaoqiSettings:
     """[rad/s] Highest speed of the farthest joint on the way from NAOqi's stand to the model's posture ``stand``."""
     servo_stiffness: float | None = None
     """[N m/rad] of the servos, for gravity compensation; None = none, since nobody publishes it: measure it first."""
+    learning: bool = False
+    """Whether ``servo_stiffness`` is a guess that encoders and feet correct, see ``hw.learning``: tried in simulation
+    only."""
 
 
 class NaoqiDriver:
@@ -85,8 +89,7 @@ class NaoqiDriver:
         self._robot, self._settings = robot, settings or NaoqiSettings()
         self._zeros, self._notice = zeros or no_zeros(robot), notice
         self._names, self._keys = list(robot.joint_names), keys(robot.joint_names)
-        stiffness = self._settings.servo_stiffness
-        self._command = servo_command(robot, stiffness and stiffness * self._settings.stiffness)
+        self._command = _servo_command(robot, self._settings)
         self._link: NaoqiLink | None = None
         self._thread: threading.Thread | None = None
         self._leaving: NaoqiLink | None = None
@@ -264,3 +267,15 @@ class NaoqiDriver:
 
     def _now(self) -> float:
         return time.monotonic() - self._began
+
+
+def _servo_command(robot: RobotModel, settings: NaoqiSettings) -> ServoCommand:
+    """What is added for gravity."""
+    if settings.servo_stiffness is None:
+        return servo_command(robot, None)
+    stiffness = settings.servo_stiffness * settings.stiffness
+    return (
+        LearningCompensation(robot, stiffness, settings.period)
+        if settings.learning
+        else servo_command(robot, stiffness)
+    )

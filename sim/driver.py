@@ -11,7 +11,8 @@ import numpy as np
 from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.driver import RobotState
-from naoimitate.hw.servo_command import Target, servo_command, target_of
+from naoimitate.hw.learning import LearningCompensation
+from naoimitate.hw.servo_command import ServoCommand, Target, servo_command, target_of
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.model import Scene
 from naoimitate.sim.physics import Physics
@@ -26,8 +27,9 @@ class MujocoDriver:
     """A robot in MuJoCo that stands in its posture ``stand`` until the first command.
 
     real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
-    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity. scene: adds
-    objects to the robot's world. The hands are closed until a command opens them.
+    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity; learning: for the
+    stiffness that the servos show, not just that of the settings. scene: adds objects to the robot's world. The hands
+    are closed until a command opens them.
     """
 
     def __init__(
@@ -36,12 +38,17 @@ class MujocoDriver:
         settings: SimSettings = DEFAULT,
         *,
         compensation: bool = True,
+        learning: bool = True,
         real_time: bool = True,
         scene: Scene | None = None,
     ) -> None:
         self._settings = settings
         self._physics = Physics(robot, settings, scene)
-        self._servos = servo_command(robot, settings.stiffness if compensation else None)
+        self._servos: ServoCommand
+        if compensation and learning:
+            self._servos = LearningCompensation(robot, settings.stiffness, settings.period)
+        else:
+            self._servos = servo_command(robot, settings.stiffness if compensation else None)
         self._real_time = real_time
         stand = robot.postures["stand"]
         self._stand = self._target = Target(stand, *stand_on_floor(robot, stand), "D")
