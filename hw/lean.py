@@ -24,6 +24,12 @@ def up_from_angles(angles: Array) -> tuple[float, float, float]:
     return -math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)
 
 
+def quat_from_angles(angles: Array) -> Array:
+    """A torso's orientation (4,) with roll and pitch (2,) rad and heading +x: Ry(pitch) Rx(roll)."""
+    (sr, sp), (cr, cp) = np.sin(0.5 * angles), np.cos(0.5 * angles)
+    return np.array([cp * cr, cp * sr, sp * cr, -sp * sr])
+
+
 def lean(planned_quat: Array, angles: Array) -> float:
     """Angle in rad between where up is planned to be and where it is measured; NaN where angles are."""
     planned, measured = up_from_quat(planned_quat), up_from_angles(angles)

@@ -19,7 +19,7 @@ from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.physics import GRAVITY
 from naoimitate.hw.compensation import GravityCompensation
 from naoimitate.hw.driver import RobotState
-from naoimitate.hw.lean import lean
+from naoimitate.hw.lean import lean, quat_from_angles
 from naoimitate.hw.servo_command import Target
 from naoimitate.robot.model import RobotModel
 
@@ -87,7 +87,7 @@ class LearningCompensation:
         """Servo angles (J,) rad that end up at a target."""
         nominal = self._gravity.command(target.q, target.base_quat, target.support, self._stiffness)
         sag = nominal - target.q
-        self._look(target, state, sag)
+        self._look(target, state)
         command = self._offset_from(nominal, sag)
         behind = command if self._behind is None else self._behind
         self._behind = behind + self._period / (self._s.lag + self._period) * (command - behind)
@@ -103,16 +103,18 @@ class LearningCompensation:
         lowest, highest = np.minimum(robot.lower, nominal), np.maximum(robot.upper, nominal)
         return np.asarray(np.clip(nominal + self._offset, lowest, highest))
 
-    def _look(self, target: Target, state: RobotState, nominal: Array) -> None:
-        """Learn from a state, where it tells anything; nominal: (J,) rad, the sag of the nominal stiffness."""
+    def _look(self, target: Target, state: RobotState) -> None:
+        """Learn from a state, where it tells anything: gravity pulls where it is measured to, on a tilted floor too."""
         new, self._time = state.time > self._time, state.time
         if not new or self._behind is None or not self._tells(target, state):
             return
         s, legs = self._s, self._legs
         share = self._period / s.memory
+        torso = quat_from_angles(state.angles)
+        nominal = (self._gravity.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
         sag = (self._behind - state.q)[legs]
-        self._products += share * (float(nominal[legs] @ sag) - self._products)
-        self._squares += share * (float(nominal[legs] @ nominal[legs]) - self._squares)
+        self._products += share * (float(nominal @ sag) - self._products)
+        self._squares += share * (float(nominal @ nominal) - self._squares)
         found = min(max(self._products / self._squares, s.firmest), s.softest)
         step = s.rate * self._period
         self._learned += min(max(found - self._learned, -step), step)
