@@ -126,7 +126,7 @@ class Watch:
                 if trouble is None:
                     return True
                 self._notice(trouble)
-        self._end(onlooker, 1.0)
+        self._end(onlooker, CLOSING_TIME)
         return False
 
     def _run(self) -> None:
