@@ -15,21 +15,16 @@ from collections.abc import Callable, Iterator
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError, NaoimitateError
-from naoimitate.core.frames import Array, RobotCommand
+from naoimitate.core.frames import RobotCommand
 from naoimitate.fsm.fall_latch import Action, FallLatch
 from naoimitate.hw.condition import WATCHED, Condition, Delays, GuardSettings, GuardStatus
 from naoimitate.hw.driver import INTERRUPTED, Driver, RobotState
-from naoimitate.hw.lean import UPRIGHT, lean
+from naoimitate.hw.lean import UPRIGHT, lean, turning
+from naoimitate.hw.letting_go import LettingGo
 from naoimitate.hw.spell import Spell
 
 __all__ = ["NOT_LIVE", "Condition", "Delays", "GuardSettings", "GuardStatus", "GuardedDriver"]
 
-GRACE = 0.05
-"""[s] that an emergency stop waits for the driver to let go of the robot; what takes longer goes on by itself."""
-LOOK = 0.002
-"""[s] between two looks meanwhile."""
-AGAIN = 0.05
-"""[s] after which a driver that is still connecting is stopped again."""
 NOT_LIVE = "not live"
 """Why a command is refused before ``connect`` and after the end."""
 
@@ -51,8 +46,7 @@ class GuardedDriver:
         self.__driver, self._gate, self._settings, self._clock = driver, gate, settings or GuardSettings(), clock
         self._lock = threading.RLock()
         self._latch = FallLatch(self._settings.fall)
-        self._ended, self._gone, self._arrived = threading.Lock(), threading.Event(), threading.Event()
-        self._gone.set()
+        self._letting_go = LettingGo(self._stop_driver, self._stop_again)
         self._alive, self._problem = Condition.OFF, ""
         self._over: Condition | None = None
         self._pressed = False
@@ -115,10 +109,9 @@ class GuardedDriver:
         with self._lock:
             if self._condition in (Condition.FALLING, Condition.FALLEN, Condition.EMERGENCY):
                 raise DriverError(f"{self._condition.value}: put the robot on its feet, then reset and connect again")
-            self._end(Condition.STOPPED)  # a connection that nobody has ended
-            self._gone.wait()
+            self.stop()  # a connection that nobody has ended
             self._latch, self._command, self._problem, self._refusing = FallLatch(self._settings.fall), None, "", ()
-            self._ended, self._gone, self._arrived = threading.Lock(), threading.Event(), threading.Event()
+            self._letting_go = LettingGo(self._stop_driver, self._stop_again)
             self._alive, self._over = Condition.CONNECTING, None
             try:
                 self._connect_driver()
@@ -126,8 +119,8 @@ class GuardedDriver:
                 self._end(Condition.STOPPED)
                 raise
             if self._condition is not Condition.CONNECTING:
-                self._gone.wait()
-                self._try(self.__driver.stop)  # again: the driver may have gone on after the last
+                self._letting_go.wait()
+                self._stop_driver()  # again: the driver may have gone on after the last
                 raise DriverError(f"{self._condition.value} while the robot was being connected")
             self._alive = Condition.LIVE
 
@@ -138,7 +131,7 @@ class GuardedDriver:
                     raise DriverError(INTERRUPTED)
                 driver.connect()
             finally:
-                self._arrived.set()
+                self._letting_go.arrived()
             self._begin(driver.read())
 
     def _begin(self, state: RobotState) -> None:
@@ -204,7 +197,8 @@ class GuardedDriver:
         Where the wait is interrupted (Ctrl-C), letting go goes on by itself, and a second ``stop`` waits for it again.
         """
         self._end(Condition.STOPPED)
-        self._gone.wait()
+        if self._alive is not Condition.OFF:
+            self._letting_go.wait()
 
     def emergency_stop(self) -> None:
         """End every motion at once, soften the servos, then let go of the robot: hold it, it ends limp.
@@ -215,7 +209,7 @@ class GuardedDriver:
         command passes any more until ``reset``.
 
         Nothing here waits for a lock, since whoever holds one may be the one that is interrupted, nor longer than
-        ``GRACE``: another thread goes on with letting go, and ``stop`` waits for it.
+        ``letting_go.GRACE``: another thread goes on with letting go, and ``stop`` waits for it.
         """
         self._pressed = True
         self._try(self.__driver.emergency_stop)
@@ -247,7 +241,7 @@ class GuardedDriver:
             return
         self._sensed = state.time
         self._lean = lean(UPRIGHT if self._command is None else self._command.base_quat, state.angles)
-        action = self._latch.sense(self._lean, _turning(state.gyro), state.fell, dt)
+        action = self._latch.sense(self._lean, turning(state.gyro), state.fell, dt)
         if action is Action.SOFTEN:
             self._alive = Condition.FALLING
             self._try(lambda: self.__driver.soften(self._settings.fall_stiffness))
@@ -255,11 +249,8 @@ class GuardedDriver:
             self._end(Condition.FALLEN)
 
     def _end(self, condition: Condition, stiffness: float | None = None) -> None:
-        """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does.
-
-        A thread of its own lets go, so that nothing which interrupts this one leaves the robot as it is.
-        """
-        if self._alive is Condition.OFF or not self._ended.acquire(blocking=False):
+        """Let go of the robot, once for each connection, and stay in a defined condition whatever the driver does."""
+        if self._alive is Condition.OFF or not self._letting_go.begin():
             return
         fell = self._alive is Condition.FALLING
         self._over = Condition.FALLEN if fell else condition
@@ -267,22 +258,19 @@ class GuardedDriver:
             if stiffness is not None and not fell:
                 self._try(lambda: self.__driver.soften(stiffness))
         finally:
-            threading.Thread(target=self._let_go, args=(self._gone,), name="letting go").start()
-        if condition is not Condition.EMERGENCY:
-            self._gone.wait()
-            return
-        end = time.monotonic() + GRACE
-        while not self._gone.is_set() and time.monotonic() < end:  # ``wait`` takes a lock
-            time.sleep(LOOK)
+            self._letting_go.go()
+        if condition is Condition.EMERGENCY:
+            self._letting_go.wait_briefly()
+        else:
+            self._letting_go.wait()
 
-    def _let_go(self, gone: threading.Event) -> None:
-        """Stop the driver; one that is connecting again and again, since what came before it began does not count."""
+    def _stop_driver(self) -> None:
         self._try(self.__driver.stop)
-        while not self._arrived.wait(AGAIN):
-            if self._pressed:
-                self._try(self.__driver.emergency_stop)
-            self._try(self.__driver.stop)
-        gone.set()
+
+    def _stop_again(self) -> None:
+        if self._pressed:
+            self._try(self.__driver.emergency_stop)
+        self._stop_driver()
 
     @contextlib.contextmanager
     def _used(self) -> Iterator[Driver]:
@@ -309,8 +297,3 @@ def _line(error: Exception) -> str:
     if isinstance(error, NaoimitateError):
         return str(error)
     return f"the driver failed ({type(error).__name__}: {' '.join(str(error).split())})"
-
-
-def _turning(gyro: Array) -> float:
-    """Speed (rad/s) of the torso about horizontal axes."""
-    return math.hypot(float(gyro[0]), float(gyro[1]))

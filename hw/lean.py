@@ -35,3 +35,8 @@ def lean(planned_quat: Array, angles: Array) -> float:
     planned, measured = up_from_quat(planned_quat), up_from_angles(angles)
     cosine = sum(a * b for a, b in zip(planned, measured, strict=True))
     return math.acos(min(max(cosine, -1.0), 1.0)) if cosine == cosine else math.nan
+
+
+def turning(gyro: Array) -> float:
+    """Speed (rad/s) of a torso about horizontal axes; gyro: (3,) rad/s."""
+    return math.hypot(float(gyro[0]), float(gyro[1]))

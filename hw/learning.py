@@ -46,6 +46,8 @@ class LearningSettings:
     """[s] by which servos follow their command: a sag is measured against the command of that time ago."""
     slow: float = 0.2
     """[rad/s] A leg with a faster joint tells nothing: its joints are behind for other reasons."""
+    telling: float = math.radians(0.1)
+    """[rad] Norm of the legs' nominal sags under which they tell nothing, as with legs that are straight."""
     lost: float = 0.2
     """[rad] A joint farther away from its command is blocked or held."""
     leaning: float = math.radians(8.0)
@@ -112,6 +114,8 @@ class LearningCompensation:
         share = self._period / s.memory
         torso = quat_from_angles(state.angles)
         nominal = (self._gravity.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
+        if nominal @ nominal < s.telling**2:
+            return
         sag = (self._behind - state.q)[legs]
         self._products += share * (float(nominal @ sag) - self._products)
         self._squares += share * (float(nominal @ nominal) - self._squares)

@@ -294,7 +294,7 @@ def test_an_emergency_stop_while_the_last_connection_is_let_go_of_reaches_the_ne
     latch = guard._latch
     robot.stop = lambda: robot._do("stop") or guard.emergency_stop()  # type: ignore[func-returns-value,method-assign]
     if ended:
-        guard._gone.wait = lambda timeout=None: guard.emergency_stop() or True  # type: ignore[func-returns-value]
+        guard._letting_go.wait = guard.emergency_stop  # type: ignore[method-assign]
     done = len(robot.done)
     with pytest.raises(DriverError, match="stopped while"):
         guard.connect()
