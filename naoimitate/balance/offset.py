@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,27 +15,56 @@ from naoimitate.limits import braking_speed
 Array = npt.NDArray[np.float64]
 
 
+class Span(NamedTuple):
+    """What a weight shift happens on, along the line from the left to the right sole's centre.
+
+    length: m between the centres. height: m of the CoM. low, high: m from the left centre, how far the soles reach.
+    """
+
+    length: float
+    height: float
+    low: float
+    high: float
+
+
 @dataclass(frozen=True)
 class OffsetLaw:
     """How fast the CoM may be shifted from foot to foot."""
 
+    shift: str = "pendulum"
+    """``pendulum``: as fast as the zero moment point allows. ``parabola``: the paper's speed law."""
+    reach: float = 0.035
+    """[m] by which a pendulum's zero moment point may be away from the CoM's projection."""
+    zmp_margin: float = 0.015
+    """[m] by which it stays inside the soles."""
     min_speed: float = 0.05
     """[1/s] at the borders 0 and 1: the paper's pure parabola never leaves them."""
     max_speed: float = 1.0
     """[1/s] in the middle, 0.5."""
     max_zmp_shift: float = 0.010
-    """[m] by which the acceleration of the offset may move the zero moment point."""
+    """[m] by which the acceleration of the parabola's offset may move the zero moment point."""
     min_feet_distance: float = 0.03
     """[m] below which (6) is ill-conditioned and the last value is kept."""
 
     def speed(self, offset: float) -> float:
         """v(o) = v_min + (v_max - v_min) 4 o (1 - o), 1/s: the paper's negative quadratic with its maximum at 0.5."""
+        if self.shift == "pendulum":
+            return math.inf
         o = min(max(offset, 0.0), 1.0)
         return self.min_speed + (self.max_speed - self.min_speed) * 4.0 * o * (1.0 - o)
 
-    def acceleration(self, feet_distance: float, com_height: float) -> float:
-        """Largest acceleration of the offset, 1/s^2: a = g dZMP / (z d), from the linear inverted pendulum."""
-        return GRAVITY * self.max_zmp_shift / (max(com_height, 1e-3) * max(feet_distance, self.min_feet_distance))
+    def accelerations(self, offset: float, span: Span) -> tuple[float, float]:
+        """Largest acceleration of the offset towards 0 and towards 1, 1/s^2, from the linear inverted pendulum.
+
+        The CoM is pushed away from the zero moment point: a = g (p_CoM - p_ZMP) / (z d).
+        """
+        length = max(span.length, self.min_feet_distance)
+        gain = GRAVITY / (max(span.height, 1e-3) * length)
+        if self.shift == "parabola":
+            return gain * self.max_zmp_shift, gain * self.max_zmp_shift
+        room_ahead = span.high - self.zmp_margin - offset * length
+        room_behind = offset * length - span.low - self.zmp_margin
+        return tuple(gain * min(max(room, 0.25 * self.reach), self.reach) for room in (room_ahead, room_behind))
 
 
 def normalised_offset(com: Array, left: Array, right: Array, last: float, min_distance: float = 0.03) -> float:
@@ -50,18 +80,19 @@ def normalised_offset(com: Array, left: Array, right: Array, last: float, min_di
 
 
 def advance(
-    offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, acceleration: float
+    offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, span: Span
 ) -> tuple[float, float]:
     """One step of the offset towards its target: the speed law, and an acceleration bound, braking included.
 
-    offset, target: normalised; velocity: 1/s; dt: s; acceleration: 1/s^2. Returns the new offset and velocity.
+    offset, target: normalised; velocity: 1/s; dt: s. Returns the new offset and velocity.
     The offset never leaves [0, 1] and stops at its target without passing it. Only a target that jumps nearer than the
     way to brake is passed and come back to: to stop dead would throw the ZMP.
     """
     distance = target - offset
-    wanted = math.copysign(min(law.speed(offset), braking_speed(abs(distance), acceleration, dt)), distance)
-    change = acceleration * dt
-    velocity = min(max(wanted, velocity - change), velocity + change)
+    back, forth = law.accelerations(offset, span)
+    brake = law.accelerations(target, span)[0 if distance > 0.0 else 1]
+    wanted = math.copysign(min(law.speed(offset), braking_speed(abs(distance), brake, dt)), distance)
+    velocity = min(max(wanted, velocity - back * dt), velocity + forth * dt)
     moved = offset + velocity * dt
     if abs(moved - target) < 1e-9:
         return target, velocity

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.legs import Legs
-from naoimitate.balance.offset import OffsetLaw, advance
+from naoimitate.balance.offset import OffsetLaw, Span, advance
 from naoimitate.balance.planted import SCALES, Planted
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
@@ -181,8 +181,8 @@ class PaperFeet:
         )
         target = offset_target(self._fsm.step(given), given, footing.offset)
         centres = self._maker.centres(pose.sole_pos, pose.sole_rot)
-        limit = self._law.acceleration(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]))
-        return advance(self._offset, self._speed, target, dt, self._law, limit)
+        span = Span(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]), -np.inf, np.inf)
+        return advance(self._offset, self._speed, target, dt, self._law, span)
 
     def _mapped_soles(self, q_arms: Array, feet: Array) -> Soles:
         """The soles where the posture mapping puts them, feet (2, 3) m from the hips; beside each other, not inside."""

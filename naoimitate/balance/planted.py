@@ -117,7 +117,7 @@ class Planted:
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side, plan.kind != POSE)
-        about, low, high = self._sway.bounds(pose, moved, plan.sway, reach.dt)
+        about, low, high = self._sway.bounds(pose, moved, plan.sway, stride.shift(plan), reach.dt)
         goal = goal._replace(about=about, sway_low=low, sway_high=high)
         ways = ((goal, rows[1]), (goal._replace(overload=np.inf), np.minimum(rows[1], 0.0)))
         start, iterations = q.copy(), 0

@@ -10,6 +10,7 @@ from numba import njit
 
 from naoimitate.balance.legs import POSE, Legs, Stance, base_pose
 from naoimitate.balance.offset import normalised_offset
+from naoimitate.core.geometry import distance_to_edge
 from naoimitate.robot.kernel import forward
 from naoimitate.robot.model import RobotModel, Tree
 
@@ -55,6 +56,14 @@ class PoseMaker:
     def centres(self, sole_pos: Array, sole_rot: Array) -> Array:
         """Centroids of the sole outlines in the world, (2, 3) m: the foot centres of (6)."""
         return _centres(self._legs.centre, sole_pos, sole_rot)
+
+    def reach(self, sole_rot: Array, along: Array) -> tuple[float, float]:
+        """How far (m) the left sole reaches from its centre against a direction (2,), and the right one along it."""
+        found = []
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            dx, dy = sign * (sole_rot[side].T[:2, :2] @ along)
+            found.append(distance_to_edge(self._legs.outline[side], *self._legs.centre[side][:2], dx, dy))
+        return found[0], found[1]
 
     def lowest(self, pose: Pose) -> float:
         """Height of the lowest point of both sole outlines, m."""

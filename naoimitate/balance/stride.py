@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from naoimitate.balance.landing import LandingSet
 from naoimitate.balance.legs import FREE, POSE, REACH
-from naoimitate.balance.offset import OffsetLaw, advance
+from naoimitate.balance.offset import OffsetLaw, Span, advance
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Footing
 from naoimitate.balance.sway import ONE_FOOT, QUIET, TWO_FEET, SwayLimits
@@ -101,12 +101,12 @@ class Stride:
             self._changed(before)
         target = offset_target(self.mode, given, footing.offset)
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
-        limit = self._law.acceleration(float(np.hypot(*(right - left)[:2])), float(pose.com[2]))
+        span = self._span(left, right, float(pose.com[2]))
         late = self._is_late(pose, dt)
         there = abs(self.offset - target) < OFFSET_REACHED and not late
         self._still = self._still + dt if there and calm and not self.swinging else 0.0
         wanted = self.offset if late else target
-        offset, speed = advance(self.offset, self._offset_speed, wanted, dt, self._law, limit)
+        offset, speed = advance(self.offset, self._offset_speed, wanted, dt, self._law, span)
         if self._swing is None:
             self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)
             other = 1 - self.side
@@ -114,6 +114,20 @@ class Stride:
             sway = QUIET if lifting else self._sway_on_both()
             return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE, sway)
         return self._swing_plan(self._swing, pose, footing, (offset, speed), dt)
+
+    def _span(self, left: Array, right: Array, height: float) -> Span:
+        """What the weight is shifted on, soles as they stand."""
+        line = (right - left)[:2]
+        length = float(np.hypot(*line))
+        along = line / max(length, 1e-6)
+        reach = self._maker.reach(self.planted_rot, along)
+        return Span(length, height, -reach[0], length + reach[1])
+
+    def shift(self, plan: Plan) -> tuple[Array, Array]:
+        """Velocity (2,) m/s at which the CoM is to be shifted before and after a plan's frame."""
+        left, right = self._maker.centres(self.planted_pos, self.planted_rot)
+        line = (right - left)[:2]
+        return self._offset_speed * line, plan.offset_speed * line
 
     def _is_late(self, pose: Pose, dt: float) -> bool:
         """Whether the CoM is behind its place; for longer and longer only if it is farther and farther."""

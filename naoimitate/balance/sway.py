@@ -73,23 +73,43 @@ class Sway:
         self._torso[:3] = (pose.base_pos - before.base_pos) @ before.base_rot / dt
         self._torso[3:] = rotation_vector(before.base_rot.T @ pose.base_rot) / dt
 
-    def bounds(self, pose: Pose, arms: Pose, limits: SwayLimits, dt: float) -> tuple[Array, Array, Array]:
+    def bounds(
+        self, pose: Pose, arms: Pose, limits: SwayLimits, shift: tuple[Array, Array], dt: float
+    ) -> tuple[Array, Array, Array]:
         """What the legs may add in the next dt s: the point (3,) m on the floor, lowest and highest (8,), ``LegGoal``.
 
-        arms: the pose with the arms where they will be, and the legs as they were.
+        arms: the pose with the arms where they will be, and the legs as they were. shift: velocities (2,) m/s of the
+        planned weight shift before and after the step; the limits hold for what the body does beside it.
         """
-        return _bounds(self._mass, self._speed, self._torso, pose.com, pose.centres, arms.centres, limits, dt)
+        before, after = (np.array([x, y, 0.0]) for x, y in shift)
+        return _bounds(
+            self._mass, self._speed, self._torso, pose.com, pose.centres, arms.centres, limits,
+            before * dt, after * dt, pose.base_rot, dt,
+        )  # fmt: skip
 
 
 @njit(cache=True)
 def _bounds(
-    mass: Array, speed: Array, torso: Array, com: Array, here: Array, arms: Array, limits: SwayLimits, dt: float
+    mass: Array,
+    speed: Array,
+    torso: Array,
+    com: Array,
+    here: Array,
+    arms: Array,
+    limits: SwayLimits,
+    shifted: Array,
+    shift: Array,
+    base: Array,
+    dt: float,
 ) -> tuple[Array, Array, Array]:
     about = np.array([com[0], com[1], 0.0])
-    coasting, arms_way, low, high = np.empty(8), np.zeros(8), np.empty(8), np.empty(8)
-    _moment(mass, here, speed * dt, about, coasting)
+    coasting, arms_way, planned, low, high = np.empty(8), np.zeros(8), np.zeros(8), np.empty(8), np.empty(8)
+    _moment(mass, here, speed * dt - shifted, about, coasting)
     _moment(mass, here, arms - here, about, arms_way)
+    _moment(mass, here, np.zeros_like(here) + shift, about, planned)
     coasting[2:] = torso * dt
+    coasting[2:5] -= base.T @ shifted
+    planned[2:5] = base.T @ shift
     momentum = math.sqrt(GRAVITY * max(com[2], LOWEST)) * limits.drift
     for i in range(8):
         most, change = momentum, GRAVITY * limits.zmp
@@ -100,7 +120,7 @@ def _bounds(
         slowest, fastest = coasting[i] - change * dt * dt, coasting[i] + change * dt * dt
         low[i], high[i] = max(slowest, -most * dt), min(fastest, most * dt)
         low[i], high[i] = min(low[i], max(slowest, high[i])), max(high[i], min(fastest, low[i]))
-        low[i], high[i] = low[i] - arms_way[i], high[i] - arms_way[i]
+        low[i], high[i] = low[i] + planned[i] - arms_way[i], high[i] + planned[i] - arms_way[i]
     return about, low, high
 
 

@@ -140,6 +140,21 @@ def polygon_margin(polygon: Array, x: float, y: float) -> float:
     return margin
 
 
+@njit(cache=True)
+def distance_to_edge(polygon: Array, x: float, y: float, dx: float, dy: float) -> float:
+    """How far (m) a point inside a convex counter-clockwise polygon (N, 2) is from its edge along a unit direction."""
+    nearest = np.inf
+    n = polygon.shape[0]
+    for i in range(n):
+        ax, ay = polygon[i]
+        bx, by = polygon[(i + 1) % n]
+        nx, ny = by - ay, ax - bx
+        along = nx * dx + ny * dy
+        if along > 0.0:
+            nearest = min(nearest, (nx * (ax - x) + ny * (ay - y)) / along)
+    return nearest
+
+
 def polygon_centroid(polygon: Array) -> Array:
     """Centroid (2,) of a simple polygon (N, 2) by its area."""
     x, y = polygon[:, 0], polygon[:, 1]

@@ -12,10 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from naoimitate.balance.offset import OffsetLaw
+from naoimitate.balance.offset import OffsetLaw, Span, advance
 from naoimitate.core.frames import Motion
 from naoimitate.fsm import Mode
 from naoimitate.fsm.support import OFFSET_REACHED
+
+
+STANCE = Span(0.10, 0.26, -0.04, 0.14)
+"""A usual stance of a small humanoid, for how long a weight shift takes."""
 
 
 @dataclass(frozen=True)
@@ -141,8 +145,12 @@ def _ready(support: str, mode: Mode, offset: float) -> bool:
 
 
 def _shift_times(law: OffsetLaw) -> tuple[np.ndarray, np.ndarray]:
-    """Offsets and the time (s) at which the speed law, starting at 0, reaches them."""
-    offsets = np.linspace(0.0, 1.0, 101)
-    speeds = np.array([law.speed(o) for o in offsets])
-    times = np.concatenate([[0.0], np.cumsum(np.diff(offsets) * 2.0 / (speeds[1:] + speeds[:-1]))])
-    return offsets, times
+    """Offsets and the time (s) at which the law, starting at 0, reaches them on an average stance."""
+    offset, velocity, time, dt = 0.0, 0.0, 0.0, 0.01
+    offsets, times = [offset], [time]
+    while offset < 1.0 and time < 10.0:
+        offset, velocity = advance(offset, velocity, 1.0, dt, law, STANCE)
+        time += dt
+        offsets.append(offset)
+        times.append(time)
+    return np.array(offsets), np.array(times)
