@@ -26,6 +26,8 @@ COM_LATE = 0.003
 """[m] by which the CoM may be off its place before the offset waits for it..."""
 PATIENCE = 0.15
 """[s] ...and the time in which as much again is let pass: a CoM that cannot get there must not wait for ever."""
+COM_THERE = 0.006
+"""[m] by which it may be off its place over one foot when the other one is lifted."""
 ONE_SIDED = 0.1
 """Share of the weight on a foot below which the other one stands alone."""
 _KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
@@ -102,8 +104,9 @@ class Stride:
         target = offset_target(self.mode, given, footing.offset)
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         span = self._span(left, right, float(pose.com[2]))
-        late = self._is_late(pose, dt)
-        there = abs(self.offset - target) < OFFSET_REACHED and not late
+        error = float(np.hypot(*(pose.com[:2] - self.com_goal(self.offset))))
+        late = self._is_late(error, dt)
+        there = abs(self.offset - target) < OFFSET_REACHED and not late and error < COM_THERE
         self._still = self._still + dt if there and calm and not self.swinging else 0.0
         wanted = self.offset if late else target
         offset, speed = advance(self.offset, self._offset_speed, wanted, dt, self._law, span)
@@ -129,9 +132,8 @@ class Stride:
         line = (right - left)[:2]
         return self._offset_speed * line, plan.offset_speed * line
 
-    def _is_late(self, pose: Pose, dt: float) -> bool:
-        """Whether the CoM is behind its place; for longer and longer only if it is farther and farther."""
-        error = float(np.hypot(*(pose.com[:2] - self.com_goal(self.offset))))
+    def _is_late(self, error: float, dt: float) -> bool:
+        """Whether the CoM, ``error`` m off its place, is behind; for longer and longer only if it is farther off."""
         self._waited = self._waited + dt if error > COM_LATE else 0.0
         return error > COM_LATE * (1.0 + self._waited / PATIENCE)
 
