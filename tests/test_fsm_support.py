@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from naoimitate.balance.offset import OffsetLaw, advance
+from naoimitate.balance.offset import OffsetLaw, Push, advance
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, next_mode, offset_target, wanted_stance
 from naoimitate.fsm.support import OFFSET_REACHED
 
@@ -180,7 +180,7 @@ class Walker:
         seen = SupportInput(human, self.offset, before.landing and self.height == 0.0, low, ok, ahead)
         mode = self.fsm.step(seen)
         target = offset_target(mode, seen, human_offset)
-        self.offset, self.speed = advance(self.offset, self.speed, target, DT, OffsetLaw(), 3.0)
+        self.offset, self.speed = advance(self.offset, self.speed, target, DT, OffsetLaw(), Push(3.0, 3.0, 3.0))
         if before.landing and mode is D:
             self.good = not (self.bad_landings and self.bad_landings.pop())
         if mode in (L, R):

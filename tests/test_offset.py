@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from naoimitate.balance.offset import GRAVITY, OffsetLaw, advance, normalised_offset
+from naoimitate.balance.offset import GRAVITY, OffsetLaw, Push, Span, advance, normalised_offset
 
 LAW = OffsetLaw()
 FEET, COM_HEIGHT = 0.10, 0.26
 """m: a stance of 10 cm under a CoM at 26 cm, as of a robot of 0.57 m."""
-LIMIT = LAW.acceleration(FEET, COM_HEIGHT)
+STANCE = Span(FEET, COM_HEIGHT, -0.04, FEET + 0.04)
+LIMIT = LAW.push(0.5, 1.0, STANCE).forth
 ROUNDING = 3e-9
 """The offset snaps to a target that is nearer than 1e-9."""
 
@@ -21,7 +22,7 @@ def travel(start: float, target: float, dt: float = 0.01, limit: float = LIMIT) 
     """Offsets from rest until the target is reached, at most 10 s."""
     path, velocity = [start], 0.0
     while path[-1] != target and len(path) * dt < 10.0:
-        offset, velocity = advance(path[-1], velocity, target, dt, LAW, limit)
+        offset, velocity = advance(path[-1], velocity, target, dt, LAW, Push(limit, limit, limit))
         path.append(offset)
     return np.array(path)
 
@@ -58,7 +59,7 @@ def test_speed_law_is_a_parabola_that_leaves_the_borders() -> None:
 def test_acceleration_moves_the_zmp_by_at_most_10_mm() -> None:
     """Linear inverted pendulum: the ZMP is off the CoM by z a / g, with a = d o''."""
     for feet, height in ((0.05, 0.2), (0.10, 0.26), (0.3, 1.0)):
-        zmp_shift = height * feet * LAW.acceleration(feet, height) / GRAVITY
+        zmp_shift = height * feet * LAW.push(0.5, 1.0, Span(feet, height, -0.04, feet + 0.04)).brake / GRAVITY
         assert zmp_shift == pytest.approx(0.010)
 
 
@@ -100,10 +101,45 @@ def test_jumping_targets_never_throw_the_offset(
     offset, velocity, last = start, 0.0, 0.0
     for target, steps in targets:
         for _ in range(steps):
-            moved, velocity = advance(offset, velocity, target, dt, LAW, limit)
+            moved, velocity = advance(offset, velocity, target, dt, LAW, Push(limit, limit, limit))
             speed = (moved - offset) / dt
             assert 0.0 <= moved <= 1.0
             assert abs(speed) <= LAW.max_speed + 1e-9
             if moved not in (0.0, 1.0):
                 assert abs(speed - last) <= limit * dt + ROUNDING / dt, "the ZMP is thrown"
             offset, last = moved, 0.0 if moved in (0.0, 1.0) else speed
+
+
+PENDULUM = OffsetLaw(shift="pendulum")
+
+
+def pendulum(start: float, target: float, span: Span, dt: float = 0.01) -> tuple[np.ndarray, np.ndarray]:
+    """Offsets and speeds (1/s) on the pendulum, from rest until the target is reached."""
+    path, speeds = [start], [0.0]
+    while path[-1] != target and len(path) * dt < 10.0:
+        push = PENDULUM.push(path[-1], target, span)
+        offset, velocity = advance(path[-1], speeds[-1], target, dt, PENDULUM, push)
+        path.append(offset)
+        speeds.append(velocity)
+    return np.array(path), np.array(speeds)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), st.floats(0.06, 0.2), st.floats(0.15, 0.4), st.floats(0.03, 0.06))
+@settings(max_examples=60, deadline=None)
+def test_the_pendulum_keeps_the_zmp_inside_the_soles(
+    start: float, target: float, feet: float, height: float, sole: float
+) -> None:
+    path, speeds = pendulum(start, target, Span(feet, height, -sole, feet + sole))
+    assert path[-1] == target
+    assert path.min() >= min(start, target) - ROUNDING and path.max() <= max(start, target) + ROUNDING
+    zmp = feet * (path[:-1] - height / GRAVITY * np.diff(speeds) / 0.01)
+    margin = min(PENDULUM.zmp_margin, sole - PENDULUM.least_reach)
+    assert (
+        zmp[:-1].min(initial=0.0) >= -sole + margin - 1e-3 and zmp[:-1].max(initial=0.0) <= feet + sole - margin + 1e-3
+    )
+    assert np.abs(zmp - feet * path[:-1]).max(initial=0.0) <= PENDULUM.reach + 1e-3
+
+
+def test_the_pendulum_takes_half_the_time_of_the_parabola() -> None:
+    assert len(pendulum(0.5, 0.0, STANCE)[0]) <= 0.5 * len(travel(0.5, 0.0))
+    assert len(pendulum(0.0, 1.0, STANCE)[0]) <= 0.5 * len(travel(0.0, 1.0))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from people import person
 
-from naoimitate.balance.offset import OffsetLaw, advance
+from naoimitate.balance.offset import OffsetLaw, Push, advance
 from naoimitate.core.frames import Motion
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
 from naoimitate.run.pace import AutoPace, ConstantPace, PaceSettings, phases
@@ -40,7 +40,7 @@ class Robot:
         given = SupportInput(human, self.offset, self.fsm.mode.landing and self.height == 0.0, ahead=ahead)
         mode = self.fsm.step(given)
         target = offset_target(mode, given, 0.5)
-        self.offset, self.speed = advance(self.offset, self.speed, target, dt, LAW, 3.0)
+        self.offset, self.speed = advance(self.offset, self.speed, target, dt, LAW, Push(3.0, 3.0, 3.0))
         rising = mode in (Mode.LEFT, Mode.RIGHT)
         self.height = min(self.height + 2.0 * dt, 0.3) if rising else max(self.height - dt, 0.0)
 

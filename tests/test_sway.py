@@ -15,6 +15,9 @@ from naoimitate.robot.model import RobotModel
 
 DT = 0.01
 
+STILL = (np.zeros(2), np.zeros(2))
+"""No planned weight shift, before and after."""
+
 
 def lifted(pose: Pose, way: np.ndarray) -> Pose:
     """The whole robot elsewhere."""
@@ -33,7 +36,7 @@ def pose(robot: RobotModel) -> Pose:
 
 
 def test_a_body_at_rest_may_start_as_fast_as_the_zero_moment_point_allows(robot: RobotModel, pose: Pose) -> None:
-    about, low, high = Sway(robot).bounds(pose, pose, TWO_FEET, DT)
+    about, low, high = Sway(robot).bounds(pose, pose, TWO_FEET, STILL, DT)
     assert about == pytest.approx([pose.com[0], pose.com[1], 0.0])
     assert high[:2] == pytest.approx(GRAVITY * TWO_FEET.zmp * DT**2)
     assert low == pytest.approx(-high)
@@ -41,7 +44,7 @@ def test_a_body_at_rest_may_start_as_fast_as_the_zero_moment_point_allows(robot:
 
 def test_the_bound_is_the_inverted_pendulum_for_a_body_that_moves_as_one(robot: RobotModel, pose: Pose) -> None:
     """A step with the largest change of momentum about y, all links alike, moves the ZMP by just the bound: a z / g."""
-    _, _, high = Sway(robot).bounds(pose, pose, TWO_FEET, DT)
+    _, _, high = Sway(robot).bounds(pose, pose, TWO_FEET, STILL, DT)
     acceleration = high[1] / pose.com[2] / DT**2
     assert acceleration * pose.com[2] / GRAVITY == pytest.approx(TWO_FEET.zmp)
 
@@ -49,21 +52,26 @@ def test_the_bound_is_the_inverted_pendulum_for_a_body_that_moves_as_one(robot: 
 def test_what_moves_may_go_on_and_need_not_stop_at_once(robot: RobotModel, pose: Pose) -> None:
     sway, speed = Sway(robot), 0.5
     sway.accept(lifted(pose, np.array([-speed * DT, 0.0, 0.0])), pose, DT)
-    _, low, high = sway.bounds(pose, pose, ONE_FOOT, DT)
+    _, low, high = sway.bounds(pose, pose, ONE_FOOT, STILL, DT)
     coasting = speed * DT * pose.com[2]
     assert low[1] <= high[1] < coasting, "faster than allowed: it has to brake"
     assert coasting - high[1] == pytest.approx(GRAVITY * ONE_FOOT.zmp * DT**2)
     assert not sway.calm
     sway.rest()
     assert sway.calm
-    assert sway.bounds(pose, pose, ONE_FOOT, DT)[2] == pytest.approx(-sway.bounds(pose, pose, ONE_FOOT, DT)[1])
+    assert sway.bounds(pose, pose, ONE_FOOT, STILL, DT)[2] == pytest.approx(
+        -sway.bounds(pose, pose, ONE_FOOT, STILL, DT)[1]
+    )
 
 
 def test_what_the_arms_do_is_left_to_the_legs_to_make_up_for(robot: RobotModel, pose: Pose) -> None:
     maker, q = PoseMaker(robot, build_legs(robot, LegLimits())), pose.q.copy()
     q[robot.chains["l_arm"][0]] += 0.05
     arms = maker.stand(q)
-    still, moved = Sway(robot).bounds(pose, pose, TWO_FEET, DT), Sway(robot).bounds(pose, arms, TWO_FEET, DT)
+    still, moved = (
+        Sway(robot).bounds(pose, pose, TWO_FEET, STILL, DT),
+        Sway(robot).bounds(pose, arms, TWO_FEET, STILL, DT),
+    )
     assert np.abs(moved[1][:2] - still[1][:2]).max() > 1e-6
     assert moved[2] - moved[1] == pytest.approx(still[2] - still[1])
     assert moved[1][2:] == pytest.approx(still[1][2:])
@@ -72,3 +80,16 @@ def test_what_the_arms_do_is_left_to_the_legs_to_make_up_for(robot: RobotModel, 
 @pytest.mark.parametrize("tight, wide", [(QUIET, ONE_FOOT), (ONE_FOOT, TWO_FEET)])
 def test_fewer_feet_and_a_coming_step_allow_less(tight: SwayLimits, wide: SwayLimits) -> None:
     assert all(a <= b for a, b in zip(tight, wide, strict=True))
+
+
+def test_a_planned_weight_shift_is_no_sway(robot: RobotModel, pose: Pose) -> None:
+    """The body moves as the plan says, and may go on as it says: the bounds hold for what it does beside that."""
+    sway, speed = Sway(robot), np.array([0.05, 0.25])
+    sway.accept(lifted(pose, -DT * np.append(speed, 0.0)), pose, DT)
+    about, low, high = sway.bounds(pose, pose, ONE_FOOT, (speed, 1.1 * speed), DT)
+    _, still_low, still_high = Sway(robot).bounds(pose, pose, ONE_FOOT, STILL, DT)
+    assert about == pytest.approx([pose.com[0], pose.com[1], 0.0])
+    assert high - low == pytest.approx(still_high - still_low, abs=1e-9)
+    middle = 0.5 * (low + high)
+    assert middle[:2] == pytest.approx(1.1 * DT * pose.com[2] * np.array([-speed[1], speed[0]]))
+    assert pose.base_rot @ middle[2:5] == pytest.approx(1.1 * DT * np.append(speed, 0.0))

@@ -27,16 +27,26 @@ class Span(NamedTuple):
     high: float
 
 
+class Push(NamedTuple):
+    """Largest accelerations of an offset, 1/s^2: back towards 0, forth towards 1, and to come to rest at its target."""
+
+    back: float
+    forth: float
+    brake: float
+
+
 @dataclass(frozen=True)
 class OffsetLaw:
     """How fast the CoM may be shifted from foot to foot."""
 
-    shift: str = "pendulum"
-    """``pendulum``: as fast as the zero moment point allows. ``parabola``: the paper's speed law."""
-    reach: float = 0.035
+    shift: str = "parabola"
+    """``parabola``: the paper's speed law. ``pendulum``: as fast as the zero moment point allows."""
+    reach: float = 0.025
     """[m] by which a pendulum's zero moment point may be away from the CoM's projection."""
+    least_reach: float = 0.005
+    """[m] that it has at least, so that the CoM always moves."""
     zmp_margin: float = 0.015
-    """[m] by which it stays inside the soles."""
+    """[m] by which it stays inside the soles otherwise."""
     min_speed: float = 0.05
     """[1/s] at the borders 0 and 1: the paper's pure parabola never leaves them."""
     max_speed: float = 1.0
@@ -53,18 +63,26 @@ class OffsetLaw:
         o = min(max(offset, 0.0), 1.0)
         return self.min_speed + (self.max_speed - self.min_speed) * 4.0 * o * (1.0 - o)
 
-    def accelerations(self, offset: float, span: Span) -> tuple[float, float]:
-        """Largest acceleration of the offset towards 0 and towards 1, 1/s^2, from the linear inverted pendulum.
+    def push(self, offset: float, target: float, span: Span) -> Push:
+        """How hard the CoM may be pushed from an offset to its target, from the linear inverted pendulum.
 
         The CoM is pushed away from the zero moment point: a = g (p_CoM - p_ZMP) / (z d).
         """
         length = max(span.length, self.min_feet_distance)
         gain = GRAVITY / (max(span.height, 1e-3) * length)
         if self.shift == "parabola":
-            return gain * self.max_zmp_shift, gain * self.max_zmp_shift
-        room_ahead = span.high - self.zmp_margin - offset * length
-        room_behind = offset * length - span.low - self.zmp_margin
-        return tuple(gain * min(max(room, 0.25 * self.reach), self.reach) for room in (room_ahead, room_behind))
+            return Push(*[gain * self.max_zmp_shift] * 3)
+
+        def room(distance: float) -> float:
+            return min(max(distance - self.zmp_margin, self.least_reach), self.reach)
+
+        def ahead(o: float) -> float:
+            return gain * room(span.high - o * length)
+
+        def behind(o: float) -> float:
+            return gain * room(o * length - span.low)
+
+        return Push(ahead(offset), behind(offset), ahead(target) if target > offset else behind(target))
 
 
 def normalised_offset(com: Array, left: Array, right: Array, last: float, min_distance: float = 0.03) -> float:
@@ -80,7 +98,7 @@ def normalised_offset(com: Array, left: Array, right: Array, last: float, min_di
 
 
 def advance(
-    offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, span: Span
+    offset: float, velocity: float, target: float, dt: float, law: OffsetLaw, push: Push
 ) -> tuple[float, float]:
     """One step of the offset towards its target: the speed law, and an acceleration bound, braking included.
 
@@ -89,10 +107,8 @@ def advance(
     way to brake is passed and come back to: to stop dead would throw the ZMP.
     """
     distance = target - offset
-    back, forth = law.accelerations(offset, span)
-    brake = law.accelerations(target, span)[0 if distance > 0.0 else 1]
-    wanted = math.copysign(min(law.speed(offset), braking_speed(abs(distance), brake, dt)), distance)
-    velocity = min(max(wanted, velocity - back * dt), velocity + forth * dt)
+    wanted = math.copysign(min(law.speed(offset), braking_speed(abs(distance), push.brake, dt)), distance)
+    velocity = min(max(wanted, velocity - push.back * dt), velocity + push.forth * dt)
     moved = offset + velocity * dt
     if abs(moved - target) < 1e-9:
         return target, velocity

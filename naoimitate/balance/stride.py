@@ -109,7 +109,9 @@ class Stride:
         there = abs(self.offset - target) < OFFSET_REACHED and not late and error < COM_THERE
         self._still = self._still + dt if there and calm and not self.swinging else 0.0
         wanted = self.offset if late else target
-        offset, speed = advance(self.offset, self._offset_speed, wanted, dt, self._law, span)
+        offset, speed = advance(
+            self.offset, self._offset_speed, wanted, dt, self._law, self._law.push(self.offset, wanted, span)
+        )
         if self._swing is None:
             self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)
             other = 1 - self.side

@@ -22,6 +22,13 @@ if TYPE_CHECKING:
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--method", type=click.Choice(["static"]), default="static", show_default=True, help="How to imitate.")
 @click.option(
+    "--shift",
+    type=click.Choice(["parabola", "pendulum"]),
+    default="parabola",
+    show_default=True,
+    help="How the weight goes from foot to foot: by the paper's speed law, or as fast as balance allows (on trial).",
+)
+@click.option(
     "--retarget",
     type=click.Choice(["planted", "paper", "direct"]),
     default="planted",
@@ -88,11 +95,16 @@ def _choices(options: dict[str, Any]) -> dict[str, Any]:
     """The arguments of ``run.recorded.imitate`` that the options stand for."""
     import hashlib
 
+    from naoimitate.balance.offset import OffsetLaw
     from naoimitate.calib.subject import calibrate, load_subject
     from naoimitate.human.mirror import mirrored_frame
     from naoimitate.settings import Settings
 
-    settings = Settings(retarget=options["retarget"], hand_orientation=options["hand_orientation"])
+    settings = Settings(
+        retarget=options["retarget"],
+        hand_orientation=options["hand_orientation"],
+        offset=OffsetLaw(shift=options["shift"]),
+    )
     choices = {key: options[key] for key in ("speed", "rate", "sample", "start", "end", "seed")}
     if options["subject"] is not None:
         subject = load_subject(options["subject"])

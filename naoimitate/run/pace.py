@@ -17,7 +17,6 @@ from naoimitate.core.frames import Motion
 from naoimitate.fsm import Mode
 from naoimitate.fsm.support import OFFSET_REACHED
 
-
 STANCE = Span(0.10, 0.26, -0.04, 0.14)
 """A usual stance of a small humanoid, for how long a weight shift takes."""
 
@@ -149,7 +148,7 @@ def _shift_times(law: OffsetLaw) -> tuple[np.ndarray, np.ndarray]:
     offset, velocity, time, dt = 0.0, 0.0, 0.0, 0.01
     offsets, times = [offset], [time]
     while offset < 1.0 and time < 10.0:
-        offset, velocity = advance(offset, velocity, 1.0, dt, law, STANCE)
+        offset, velocity = advance(offset, velocity, 1.0, dt, law, law.push(offset, 1.0, STANCE))
         time += dt
         offsets.append(offset)
         times.append(time)
