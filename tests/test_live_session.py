@@ -216,8 +216,10 @@ def test_frames_of_nothing_and_of_nonsense_are_survived(nao: RobotModel) -> None
         return replace(frame, landmarks=landmarks)
 
     story = play(nao, 10.0, person)
-    assert np.isfinite([c.q for c in story.commands()]).all()
-    assert_smooth(nao, story)
+    q = np.array([c.q for c in story.commands()])
+    assert np.isfinite(q).all()
+    speed = np.diff(q, axis=0) / (0.9 * nao.speed * DT)
+    assert np.abs(speed).max() <= 1.0 and np.abs(np.diff(speed, axis=0)).max() <= 1.0, "what the gate allows"
 
 
 @pytest.mark.parametrize("rate", [20.0, 240.0])
