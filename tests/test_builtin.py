@@ -12,7 +12,10 @@ from naoimitate.core.geometry import matrix_from_quat, polygon_margin
 from naoimitate.human.segments import center_of_mass
 from naoimitate.motion.builtin import BODY, builtin_motion, builtin_names, builtin_phases, single_support_phases
 
-NAMES = ("paper", "step-and-reach", "squat", "bow-and-reach", "wave", "side-kick", "march", "walk")
+NAMES = (
+    *("paper", "step-and-reach", "squat", "bow-and-reach", "wave", "side-kick", "march"),
+    *("lean-and-pick", "step-and-pick", "walk"),
+)
 SLOW = tuple(name for name in NAMES if name != "walk")
 LIMBS = tuple(
     (f"{side}_{a}", f"{side}_{b}", length)

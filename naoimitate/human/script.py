@@ -21,7 +21,8 @@ class Script:
     duration s. stance: where the left and right foot stand at the beginning. offset: centre of mass on the line from
     the left (0) to the right (1) foot's centre. height: m of mid-hip above the floor. trunk, left_arm, right_arm,
     head: as in ``Parameters``. swings: in order of time. path: centre of mass over the floor, (T, 2) m, instead of the
-    offset. rate: frames a second.
+    offset. hands: opening of left and right hand, (T, 2), 0 closed to 1 open, None where nothing is known of it. rate:
+    frames a second.
     """
 
     duration: float
@@ -34,6 +35,7 @@ class Script:
     head: Curve = field(default=Track((0.0, 0.0)))
     swings: tuple[Swing | Stride, ...] = ()
     path: Curve | None = None
+    hands: Curve | None = None
     rate: float = 100.0
 
     @property

@@ -9,37 +9,31 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from naoimitate.core.errors import MotionFormatError
 from naoimitate.core.frames import HumanFrame, Motion
-from naoimitate.human.anthropometry import Anthropometry
 from naoimitate.human.procedural import arm_towards, pose
 from naoimitate.human.script import Script, parameters, support
-from naoimitate.human.steps import FootPose, Landing, Stride, Swing
-from naoimitate.human.tracks import Move, Spline, Track
-
-BODY = Anthropometry()
-"""The person of all built-in motions."""
-TOE_OUT = 0.09
-"""rad, about 5 deg of each foot in a relaxed stand."""
-STANCE_HALF = 0.10
-"""m, half the distance of the feet: a little wider than the hips."""
-STANCE: tuple[Landing, Landing] = ((0.0, STANCE_HALF, TOE_OUT), (0.0, -STANCE_HALF, -TOE_OUT))
-STAND = BODY.leg_reach(0.25) + BODY.ankle_height
-"""m of mid-hip: a stand with soft knees."""
-LEANING = STAND - 0.025
-"""m of mid-hip with the weight on one foot, so that the other leg still reaches the floor."""
-SHIFT = 2.0
-"""s to bring the weight from the middle, or from the other foot, over a foot."""
-SETTLE = 0.4
-"""s between the end of a shift and the lift, and between a landing and the next shift."""
-T_ARM = (0.0, 0.5 * np.pi, 0.0, 0.0)
-HANGING = (0.05, 0.14, 0.25, 0.0)
-UPRIGHT = (0.0, 0.0, 0.0)
+from naoimitate.human.steps import FootPose, Stride, Swing
+from naoimitate.human.tracks import Spline, Track
+from naoimitate.motion.operator import lean_and_pick, step_and_pick
+from naoimitate.motion.stand import (
+    BODY,
+    HANGING,
+    LEANING,
+    STANCE,
+    STANCE_HALF,
+    STAND,
+    T_ARM,
+    TOE_OUT,
+    UPRIGHT,
+    standing,
+    stepping,
+)
 
 
 @dataclass(frozen=True)
@@ -63,7 +57,12 @@ def builtin_motion(name: str) -> Motion:
     """
     if name not in BUILTINS:
         raise MotionFormatError(f"no built-in motion is called {name!r}: choose one of {', '.join(BUILTINS)}")
-    script = BUILTINS[name].script()
+    builtin = BUILTINS[name]
+    return scripted_motion(name, builtin.script(), builtin.about)
+
+
+def scripted_motion(name: str, script: Script, about: str) -> Motion:
+    """What the person of the built-in motions does by a script, with its support, contacts and T-pose."""
     landmarks, orientations = pose(BODY, parameters(script, BODY))
     modes = support(script)
     return Motion(
@@ -72,12 +71,13 @@ def builtin_motion(name: str) -> Motion:
         landmarks=landmarks,
         orientations=orientations,
         contacts=np.stack([(modes == "D") | (modes == side) for side in "LR"], axis=1),
+        hand_opening=None if script.hands is None else script.hands(script.time),
         support=modes,
         tpose=tpose(),
         tpose_note="the same procedural person in an exact T-pose",
         source=f"builtin:{name}",
         sha256=hashlib.sha256(landmarks.round(9).tobytes()).hexdigest(),
-        notes=(BUILTINS[name].about,),
+        notes=(about,),
     )
 
 
@@ -104,36 +104,17 @@ def single_support_phases(motion: Motion) -> tuple[tuple[str, float, float], ...
 
 def tpose() -> HumanFrame:
     """The person of the built-in motions in a T-pose that faces +x."""
-    return _still(_standing(0.01, left_arm=Track(T_ARM), right_arm=Track(T_ARM)))
+    return _still(standing(0.01, left_arm=Track(T_ARM), right_arm=Track(T_ARM)))
 
 
 def relaxed() -> HumanFrame:
     """The person of the built-in motions, standing with hanging arms and facing +x."""
-    return _still(_standing(0.01))
+    return _still(standing(0.01))
 
 
 def _still(script: Script) -> HumanFrame:
     landmarks, orientations = pose(BODY, parameters(script, BODY))
     return HumanFrame(time=0.0, landmarks=landmarks[0], orientations=orientations[0], support="D")
-
-
-def _standing(duration: float, **parts: Any) -> Script:
-    """A script of somebody who stands relaxed, but for the parts given."""
-    hanging, middle = Track(HANGING), Track(0.5)
-    relaxed = Script(duration, STANCE, middle, Track(STAND), Track(UPRIGHT), hanging, hanging)
-    return replace(relaxed, **parts)
-
-
-def _stepping(duration: float, swings: tuple[Swing, ...], **parts: Any) -> Script:
-    """A script of somebody who shifts the weight over the stance foot before each swing, and to the middle at last."""
-    offset: list[Move] = []
-    for swing in swings:
-        begin, end = swing.lift - SETTLE - SHIFT, swing.lift - SETTLE
-        offset.append((begin, end, 0.0 if swing.foot == "r" else 1.0))
-    last = swings[-1].land + SETTLE
-    offset.append((last, last + SHIFT, 0.5))
-    height = Track(STAND, ((*offset[0][:2], LEANING), (*offset[-1][:2], STAND)))
-    return _standing(duration, **{"offset": Track(0.5, tuple(offset)), "height": height, "swings": swings, **parts})
 
 
 def _paper() -> Script:
@@ -142,7 +123,7 @@ def _paper() -> Script:
     stretched = _stretched_back(0.45 * BODY.leg, 0.32)
     arms = Track(T_ARM, ((2.0, 4.0, HANGING), (7.8, 10.4, raised), (15.8, 18.4, HANGING)))
     lean = Track(UPRIGHT, ((7.4, 10.4, (0.0, 0.40, 0.0)), (15.8, 18.8, UPRIGHT)))
-    script = _stepping(
+    script = stepping(
         25.0,
         (Swing("r", 6.4, 19.8, STANCE[1], 0.06, 1.0, ((7.4, 10.2, stretched), (10.2, 15.8, stretched))),),
         trunk=lean,
@@ -171,7 +152,7 @@ def _step_and_reach() -> Script:
     low, down, up, rest = STAND - 0.085, (15.6, 19.0), (20.6, 23.6), (27.0, 30.0)
     steps = ((2.0, 4.0, LEANING), (4.4, 6.8, low), (9.8, 12.2, LEANING), (12.6, 14.6, STAND))
     lean, reach, turn = (0.0, 0.15, 0.0), (0.25, 0.75, 0.0), (-0.35, 0.1, 0.0)
-    return _stepping(
+    return stepping(
         100.0 / 3.0,
         swings,
         rate=30.0,
@@ -189,7 +170,7 @@ def _squat() -> Script:
     half, deep = (0.0, 0.40, 0.0), (0.0, 0.65, 0.0)
     forward, higher = (1.85, 0.1, 0.15, 0.0), (2.1, 0.1, 0.15, 0.0)
     arms = Track(HANGING, ((*down, forward), (*up, HANGING), (*deeper, higher), (*again, HANGING)))
-    return _standing(
+    return standing(
         20.0,
         height=Track(STAND, ((*down, STAND - 0.20), (*up, STAND), (*deeper, STAND - 0.36), (*again, STAND))),
         trunk=Track(UPRIGHT, ((*down, half), (*up, UPRIGHT), (*deeper, deep), (*again, UPRIGHT))),
@@ -208,7 +189,7 @@ def _bow_and_reach() -> Script:
     trunk = ((*down, (0.0, 1.20, 0.0)), (*up, UPRIGHT))
     sides = ((*left, (0.5, 0.3, -0.1)), (*right, (-0.5, 0.3, 0.1)), (*back, UPRIGHT))
     arms = ((*down, low), (*up, HANGING))
-    return _standing(
+    return standing(
         24.0,
         height=height,
         trunk=Track(UPRIGHT, (*trunk, *sides)),
@@ -228,7 +209,7 @@ def _wave() -> Script:
 
     waves = tuple((4.5 + half * i, 4.5 + half * (i + 1), waving(0.45 if i % 2 == 0 else -0.35)) for i in range(count))
     arm = Track(HANGING, ((2.0, 4.3, waving(-0.35)), *waves, (10.5, 13.0, HANGING)))
-    return _standing(
+    return standing(
         14.0,
         right_arm=arm,
         offset=Track(0.5, ((1.5, 4.0, 0.35), (10.5, 13.0, 0.5))),
@@ -248,7 +229,7 @@ def _side_kick() -> Script:
     )
     arms = Track(HANGING, ((4.0, 7.0, spread), (18.2, 21.2, HANGING)))
     lean = ((5.2, 7.2, (0.0, 0.0, -0.2)), (8.2, 10.2, UPRIGHT), (15.0, 17.0, (0.0, 0.0, 0.2)), (18.0, 20.0, UPRIGHT))
-    return _stepping(24.5, swings, trunk=Track(UPRIGHT, lean), left_arm=arms, right_arm=arms)
+    return stepping(24.5, swings, trunk=Track(UPRIGHT, lean), left_arm=arms, right_arm=arms)
 
 
 def _march() -> Script:
@@ -261,7 +242,7 @@ def _march() -> Script:
         raised = [((t, t + 0.9, forward), (t + 1.1, t + 2.0, HANGING)) for foot, t in lifts if foot == opposite]
         return Track(HANGING, tuple(move for pair in raised for move in pair))
 
-    return _stepping(24.0, swings, left_arm=arm("r"), right_arm=arm("l"))
+    return stepping(24.0, swings, left_arm=arm("r"), right_arm=arm("l"))
 
 
 def _walk() -> Script:
@@ -305,6 +286,8 @@ BUILTINS = {
         Builtin("wave", "the right arm goes up and waves", _wave),
         Builtin("side-kick", "a slow kick to the side with each leg", _side_kick),
         Builtin("march", "four stands of 2 s on alternate feet", _march),
+        Builtin("lean-and-pick", "on the left foot, right leg back, grasp far in front; drop aside", lean_and_pick),
+        Builtin("step-and-pick", "two steps, grasp with the right hand, drop aside", step_and_pick),
         Builtin("walk", "eight steps straight ahead at a human pace", _walk),
     )
 }
