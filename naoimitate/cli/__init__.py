@@ -21,6 +21,7 @@ from naoimitate.cli.motions import motions
 from naoimitate.cli.recover import recover
 from naoimitate.cli.reproduce import reproduce
 from naoimitate.cli.robots import robots
+from naoimitate.cli.scene import scene
 from naoimitate.cli.score import score
 from naoimitate.cli.stream import stream
 from naoimitate.cli.stress import stress
@@ -42,7 +43,8 @@ def cli(context: click.Context) -> None:
 
 
 for _command in (
-    demo, imitate, live, stream, score, check, calibrate, motions, robots, recover, reproduce, stress, can_stub,
+    demo, imitate, live, stream, score, check, calibrate, motions, robots, recover, reproduce, scene, stress,
+    can_stub,
 ):  # fmt: skip
     cli.add_command(_command)
 
