@@ -36,6 +36,7 @@ PATCHES = (
 
 
 def spoil(rng: random.Random, good: bytes) -> bytes:
+    """A datagram with a few of its bytes changed, replaced by something hostile, cut out, or repeated elsewhere."""
     data = bytearray(good)
     for _ in range(rng.choice((1, 1, 2, 4, 8))):
         at, kind = rng.randrange(len(data) + 1), rng.random()
@@ -52,6 +53,7 @@ def spoil(rng: random.Random, good: bytes) -> bytes:
 
 
 def fuzz(protocol: StreamProtocol, count: int) -> str:
+    """Feed a decoder ``count`` hostile datagrams with good ones between them; a line of what came of it."""
     rng, decoder, encoder = random.Random(1), protocol.decoder(), protocol.encoder()
     seeds = [d for k in range(3) for d in encoder.encode(replace(tpose(), time=0.01 * k), k, 0.01 * k)]
     before, slowest, understood, good = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, 0.0, 0, 0
@@ -73,6 +75,7 @@ def fuzz(protocol: StreamProtocol, count: int) -> str:
 
 
 def main(arguments: list[str]) -> None:
+    """Fuzz the protocols that the command line names, or all."""
     count = int(arguments[0]) if arguments else COUNT
     for name in arguments[1:] or PROTOCOLS:
         print(fuzz(PROTOCOLS[name], count), flush=True)

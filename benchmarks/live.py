@@ -71,6 +71,7 @@ def session(motion: str, protocol: str, rate: str, driver: str, folder: Path) ->
 
 
 def main() -> None:
+    """Stream every motion that the command line names; exits with 1 when a bar was missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("motions", nargs="*", default=[f"builtin:{name}" for name in builtin_names()])
     parser.add_argument("--driver", default="mujoco")

@@ -25,6 +25,7 @@ def memory(process: subprocess.Popen[str]) -> int:
 
 
 def main(arguments: list[str]) -> None:
+    """Run a session as long and as fast as the command line says, and print memory and delays."""
     minutes, rate, protocol, driver = (*arguments, *("30", "240", "xsens", "mujoco")[len(arguments) :])
     seconds, out = 60.0 * float(minutes), Path("soak.npz")
     program = [str(Path(sys.executable).with_name("naoimitate"))]

@@ -15,6 +15,7 @@ REPEATS = 3
 
 
 def main() -> None:
+    """Time the steps of the motions that the command line names, or of the built-in ones."""
     robot = load_robot("nao")
     print(f"{'motion':16}{'mean':>8}{'median':>8}{'p99':>8}{'max':>8}")
     for name in builtin_names():

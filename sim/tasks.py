@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from naoimitate.core.errors import CalibrationError, NaoimitateError
+from naoimitate.core.errors import CalibrationError, UnknownTask
 from naoimitate.core.falling import has_fallen, swing_load, tilt
 from naoimitate.core.frames import Array, Motion, RobotCommand
 from naoimitate.imitator import Imitator
@@ -40,10 +40,6 @@ REST_TIME, REST_WAY = 0.5, 0.002
 
 LIFTED = 0.03
 """m over its stand from which a ball counts as picked up."""
-
-
-class UnknownTask(NaoimitateError):
-    """There is no task of that name."""
 
 
 @dataclass(frozen=True)

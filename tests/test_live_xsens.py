@@ -1,78 +1,25 @@
-"""Xsens MXTP: the example packets of shared/protocols.md byte for byte, round trips, and whatever may arrive."""
+"""Xsens MVN: the packets of the protocol sheet, a person there and back, parts and persons."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-import struct
 import tracemalloc
 from dataclasses import replace
 from itertools import permutations
-from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from xsens_packets import EXAMPLES, MOTIONS, PERSON, changed, only, parts_of, pose_datagram, values_of, with_values
 
 from naoimitate.core.errors import DatagramError
-from naoimitate.core.frames import LANDMARK, SEGMENT, HumanFrame
+from naoimitate.core.frames import LANDMARK
 from naoimitate.live.protocols import mxtp
 from naoimitate.live.protocols.mxtp import Header
 from naoimitate.live.protocols.mxtp_com import AGE
 from naoimitate.live.protocols.mxtp_parts import WAITING, Parts
 from naoimitate.live.protocols.xsens import CHARACTERS, XSENS, XsensDecoder
 from naoimitate.live.protocols.xsens_encoder import SCALING_EVERY
-from naoimitate.motion.builtin import builtin_motion, builtin_names, tpose
-
-EXAMPLES = {
-    name: bytes.fromhex(text)
-    for name, text in (
-        line.split(": ") for line in (Path(__file__).parent / "data/xsens_datagrams.txt").read_text().splitlines()
-    )
-}
-"""The worked examples of shared/protocols.md, section 1.8."""
-MOTIONS = {name: builtin_motion(name) for name in builtin_names()}
-PERSON = replace(MOTIONS["paper"][200], com=MOTIONS["paper"][200]["pelvis"] + [0.02, -0.01, 0.08])
-
-
-def pose_datagram(frame: HumanFrame = PERSON, sequence: int = 1, time: float = 0.5) -> bytes:
-    return XSENS.encoder().encode(frame, sequence, time)[-1]
-
-
-def changed(datagram: bytes, **fields: object) -> bytes:
-    """A pose datagram with other header fields."""
-    header, payload = mxtp.open_datagram(datagram)
-    return mxtp.make_datagram(header._replace(**fields), payload)
-
-
-def values_of(datagram: bytes) -> tuple[np.ndarray, np.ndarray]:
-    header, payload = mxtp.open_datagram(datagram)
-    return mxtp.read_poses(mxtp.pose_items(header, payload))
-
-
-def with_values(datagram: bytes, values: np.ndarray) -> bytes:
-    header, _ = mxtp.open_datagram(datagram)
-    with np.errstate(all="ignore"):
-        return mxtp.make_datagram(header, mxtp.write_poses(np.arange(1, len(values) + 1), values))
-
-
-def parts_of(datagram: bytes, sizes: tuple[int, ...]) -> list[bytes]:
-    """The same sample split over several datagrams."""
-    header, payload = mxtp.open_datagram(datagram)
-    ends = np.cumsum(sizes)
-    return [
-        mxtp.make_datagram(
-            header._replace(part=i, last=i == len(sizes) - 1, items=size), payload[32 * (end - size) : 32 * end]
-        )
-        for i, (size, end) in enumerate(zip(sizes, ends, strict=True))
-    ]
-
-
-def only(samples: list) -> HumanFrame:
-    assert len(samples) == 1
-    return samples[0].frame
-
+from naoimitate.motion.builtin import builtin_names, tpose
 
 WHOLE = only(XSENS.decoder().feed(pose_datagram()))
 
@@ -392,141 +339,3 @@ def test_a_sample_of_endless_parts_is_refused():
         for part in range(20):
             decoder.feed(changed(datagram, part=part, last=False))
     assert len(decoder.feed(datagram)) == 1
-
-
-# -- damaged datagrams
-
-
-@pytest.mark.parametrize("name", list(EXAMPLES))
-def test_anything_shorter_than_a_header_is_refused(name):
-    for size in range(24):
-        with pytest.raises(DatagramError):
-            XSENS.decoder().feed(EXAMPLES[name][:size])
-
-
-@pytest.mark.parametrize("name", list(EXAMPLES))
-def test_a_datagram_that_is_cut_off_is_refused(name):
-    for size in range(24, len(EXAMPLES[name])):
-        with pytest.raises(DatagramError, match="look for loss"):
-            XSENS.decoder().feed(EXAMPLES[name][:size])
-
-
-def test_more_items_than_bytes_are_refused_with_and_without_a_payload_size():
-    datagram = changed(pose_datagram(), items=24)
-    for bad in (datagram, datagram[:22] + b"\0\0" + datagram[24:]):
-        with pytest.raises(DatagramError, match="24 segments"):
-            XSENS.decoder().feed(bad)
-
-
-def test_a_payload_size_that_is_not_true_is_refused():
-    datagram = pose_datagram()
-    for size in (1, 735, 737, 65535):
-        with pytest.raises(DatagramError, match=f"of {size} bytes"):
-            XSENS.decoder().feed(datagram[:22] + struct.pack(">H", size) + datagram[24:])
-
-
-@pytest.mark.parametrize("size", [-1, -(2**31), 39, 2**31 - 1])
-def test_texts_of_impossible_length_are_refused(size):
-    for name in ("meta", "origins"):
-        at = 24 if name == "meta" else 28
-        bad = EXAMPLES[name][:at] + struct.pack(">i", size) + EXAMPLES[name][at + 4 :]
-        with pytest.raises(DatagramError):
-            XSENS.decoder().feed(bad)
-
-
-def test_other_protocols_are_no_xsens():
-    for other in (b"", b"#bundle\0", b'{"version": "3,0"}', b"XTLP" + bytes(40), b"MXT"):
-        assert not XSENS.recognises(other)
-        with pytest.raises(DatagramError, match="no Xsens"):
-            XSENS.decoder().feed(other)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3e38, 1e6])
-def test_impossible_positions_are_missing_landmarks(value):
-    _, values = values_of(pose_datagram())
-    values[mxtp.ROW["LeftForeArm"], 1] = value
-    got = only(XSENS.decoder().feed(with_values(pose_datagram(), values)))
-    assert np.isnan(got["l_elbow"]).all()
-    others = [row for name, row in LANDMARK.items() if name != "l_elbow"]
-    np.testing.assert_allclose(got.landmarks[others], PERSON.landmarks[others], atol=1e-3)
-
-
-@pytest.mark.parametrize("turn", [[0, 0, 0, 0], [np.nan, 0, 0, 1], [3e38, 0, 0, 1], [0, np.inf, 0, 0], [5, 0, 0, 0]])
-def test_impossible_turns_are_missing_orientations(turn):
-    _, values = values_of(pose_datagram())
-    values[mxtp.ROW["LeftFoot"], 3:] = turn
-    got = only(XSENS.decoder().feed(with_values(pose_datagram(), values)))
-    assert np.isnan(got.orientations[SEGMENT["l_foot"]]).all()
-    assert np.isfinite(np.delete(got.orientations, SEGMENT["l_foot"], axis=0)).all()
-
-
-def test_a_damaged_leg_does_not_change_the_unit():
-    _, values = values_of(pose_datagram())
-    values[mxtp.ROW["LeftLowerLeg"], 0] = 120.0
-    got = only(XSENS.decoder().feed(with_values(pose_datagram(), values)))
-    np.testing.assert_allclose(got["r_wrist"], PERSON["r_wrist"], atol=1e-3)
-
-
-SEEDS = [*EXAMPLES.values(), *XSENS.encoder().encode(PERSON, 0, 0.0), *parts_of(pose_datagram(), (12, 11))]
-
-
-def survives(decoder: XsensDecoder, datagram: bytes) -> None:
-    """Whatever comes: good samples or a DatagramError; the good stream of another character goes on."""
-    try:
-        for sample in decoder.feed(datagram):
-            finite = sample.frame.landmarks[np.isfinite(sample.frame.landmarks)]
-            assert np.abs(finite).max(initial=0.0) <= 1001.0
-            turns = sample.frame.orientations
-            assert np.allclose(np.linalg.norm(turns[np.isfinite(turns).all(axis=1)], axis=1), 1.0)
-            assert not np.isinf(sample.frame.landmarks).any()
-    except DatagramError:
-        pass
-    got = only(decoder.feed(GOOD))
-    np.testing.assert_allclose(got.landmarks, PERSON.landmarks, atol=1e-3)
-
-
-GOOD = changed(pose_datagram(), person=200, counter=7)
-FUZZED = XsensDecoder()
-
-
-TYPED = st.builds(lambda a, b: b"MXTP" + a + b, st.sampled_from([b"02", b"12", b"13", b"24"]), st.binary(max_size=200))
-
-
-@settings(max_examples=1500, deadline=None)
-@given(st.binary(max_size=600) | TYPED)
-def test_random_bytes_do_no_harm(data):
-    survives(FUZZED, data)
-
-
-@settings(max_examples=2500, deadline=None)
-@given(st.sampled_from(SEEDS), st.lists(st.tuples(st.integers(0, 4000), st.integers(0, 255)), max_size=12),
-       st.integers(0, 900), st.booleans())  # fmt: skip
-def test_mutated_packets_do_no_harm(seed, changes, cut, sized):
-    data = bytearray(seed)
-    for at, value in changes:
-        data[at % len(data)] = value
-    if cut < len(data) // 2:
-        del data[len(data) - cut :]
-    if not sized and len(data) >= 24:
-        data[22:24] = b"\0\0"
-    survives(FUZZED, bytes(data))
-
-
-def test_the_largest_datagrams_stay_small_in_memory():
-    tracemalloc.start()
-    for seed in (b"MXTP02", b"MXTP13", b"MXTP12"):
-        datagram = seed + struct.pack(">IBBIBBBBHH", 1, 0x80, 255, 1, 0, 23, 0, 40, 0, 0) + b"\0\0\0\x01" * 16000
-        with contextlib.suppress(DatagramError):
-            XSENS.decoder().feed(datagram)
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak < 1_000_000
-
-
-@pytest.mark.parametrize("lists", [(mxtp.LONGEST_LIST + 1, 0), (0, mxtp.LONGEST_LIST + 1)])
-def test_a_scaling_longer_than_any_persons_is_refused(lists):
-    origins, points = lists
-    payload = struct.pack(">I", origins) + struct.pack(">i3f", 0, 0.0, 0.0, 0.0) * origins
-    payload += struct.pack(">I", points) + struct.pack(">HHiI3f", 1, 1, 0, 0, 0.0, 0.0, 0.0) * points
-    with pytest.raises(DatagramError, match="longer than any person's"):
-        mxtp.read_scaling(payload)

@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from naoimitate.cli import run
-from naoimitate.core.errors import CalibrationError, RenderingUnavailable
+from naoimitate.core.errors import CalibrationError, RenderingUnavailable, UnknownTask
 from naoimitate.core.falling import SWING_LOAD_LIMIT
 from naoimitate.core.geometry import polygon_centroid
 from naoimitate.motion.builtin import builtin_motion, scripted_motion
@@ -27,7 +27,7 @@ from naoimitate.sim.fingers import read_hands
 from naoimitate.sim.model import build_model
 from naoimitate.sim.scenes import BALL, BallAndBucket
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.tasks import TASKS, Attempt, Task, UnknownTask, perform, task_of
+from naoimitate.sim.tasks import TASKS, Attempt, Task, perform, task_of
 from naoimitate.sim.tasks_film import TaskStage
 
 GRASP = 0.02

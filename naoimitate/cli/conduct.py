@@ -138,6 +138,8 @@ class Notices:
 
 def _summary(rig: Rig) -> list[str]:
     counts, status = rig.feed.stream.counts, rig.driver.status
+    if not counts.datagrams and not status.accepted:
+        return []
     refused = ", ".join(f"{count} {reason}" for reason, count in sorted(status.refused.items())) or "none refused"
     return [
         f"{counts.datagrams} datagrams, {counts.frames} frames used in order, {counts.late} late, {counts.lost} lost, "

@@ -42,3 +42,7 @@ class StreamError(NaoimitateError):
 
 class DriverError(NaoimitateError):
     """A robot cannot be reached, or refuses to be driven."""
+
+
+class UnknownTask(NaoimitateError):
+    """There is no tele-operated task of that name."""

@@ -194,10 +194,12 @@ class _Reader:
         return count
 
     def vector(self) -> tuple[float, float, float]:
+        """Three numbers."""
         x, y, z = self._take(">3f")
         return x, y, z
 
     def text(self) -> str:
+        """A text behind its length; raises DatagramError where it does not fit."""
         size = self.number(">i")
         if not 0 <= size <= self.left:
             raise DatagramError(f"a text of {size} bytes in an MXTP datagram is cut off: look for loss on the way")
