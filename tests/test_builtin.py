@@ -14,7 +14,7 @@ from naoimitate.motion.builtin import BODY, builtin_motion, builtin_names, built
 
 NAMES = (
     *("paper", "step-and-reach", "squat", "bow-and-reach", "wave", "side-kick", "march"),
-    *("lean-and-pick", "step-and-pick", "walk"),
+    *("lean-and-pick", "step-and-pick", "sidestep", "turn", "stroll", "walk"),
 )
 SLOW = tuple(name for name in NAMES if name != "walk")
 LIMBS = tuple(
@@ -46,13 +46,22 @@ def speed(name: str, landmark: str) -> float:
     return float((np.linalg.norm(np.diff(point(name, landmark), axis=0), axis=-1) / np.diff(m.time)).max())
 
 
-def sole(name: str, side: str) -> np.ndarray:
-    """(T, 3) m, the sole point below the ankle."""
+def axes(name: str, segment: str) -> np.ndarray:
+    """(T, 3, 3), axes of a segment in the world."""
     q = motion(name).orientations
     assert q is not None
-    w, x, y, z = q[:, SEGMENT[f"{side}_foot"]].T
-    up = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
-    return point(name, f"{side}_ankle") - BODY.ankle_height * up
+    return np.array([matrix_from_quat(row) for row in q[:, SEGMENT[segment]]])
+
+
+def yaw(name: str, segment: str) -> np.ndarray:
+    """(T,) rad, the heading of a segment, without jumps."""
+    forward = axes(name, segment)[:, :, 0]
+    return np.unwrap(np.arctan2(forward[:, 1], forward[:, 0]))
+
+
+def sole(name: str, side: str) -> np.ndarray:
+    """(T, 3) m, the sole point below the ankle."""
+    return point(name, f"{side}_ankle") - BODY.ankle_height * axes(name, f"{side}_foot")[:, :, 2]
 
 
 def flexion(name: str, side: str, joints: tuple[str, str, str]) -> np.ndarray:
@@ -209,10 +218,19 @@ def test_motions_are_smooth(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_left_is_left(name: str) -> None:
-    for part in ("shoulder", "hip"):
-        assert (point(name, f"l_{part}") - point(name, f"r_{part}"))[:, 1].min() > 0.1
-    for side in "lr":
-        assert (point(name, f"{side}_toe") - point(name, f"{side}_ankle"))[:, 0].min() > 0.05
+    """Seen along the hips, and in the world wherever nobody turns round."""
+    ahead = axes(name, "pelvis")[:, :2, 0]
+    views = [ahead / np.linalg.norm(ahead, axis=-1, keepdims=True)]
+    if name != "turn":
+        views.append(np.tile([1.0, 0.0], (len(ahead), 1)))
+    for forward in views:
+        left = np.column_stack([-forward[:, 1], forward[:, 0]])
+        for part in ("shoulder", "hip"):
+            across = (point(name, f"l_{part}") - point(name, f"r_{part}"))[:, :2]
+            assert np.sum(across * left, axis=-1).min() > 0.1
+        for side in "lr":
+            along = (point(name, f"{side}_toe") - point(name, f"{side}_ankle"))[:, :2]
+            assert np.sum(along * forward, axis=-1).min() > 0.05
 
 
 def test_the_tpose_is_one() -> None:
@@ -267,6 +285,39 @@ def test_squat_goes_deep_and_bow_goes_down() -> None:
 def test_side_kick_goes_out_to_both_sides() -> None:
     assert [side for side, _, _ in builtin_phases("side-kick")] == ["L", "R"]
     assert point("side-kick", "r_ankle")[:, 1].min() < -0.45 and point("side-kick", "l_ankle")[:, 1].max() > 0.45
+
+
+def test_sidestep_goes_to_the_left_and_back_and_never_ahead() -> None:
+    assert [side for side, _, _ in builtin_phases("sidestep")] == ["R", "L", "R", "L", "L", "R", "L", "R"]
+    for side in "lr":
+        travel = sole("sidestep", side) - sole("sidestep", side)[0]
+        planted = on("sidestep", side)
+        assert travel[planted, 1].max() == pytest.approx(0.16) and travel[:, 1].min() > -1e-9
+        assert np.abs(travel[:, 0]).max() < 1e-9
+        assert np.abs(travel[-1]).max() < 1e-9
+
+
+def test_turn_goes_round_by_ninety_degrees_on_the_spot() -> None:
+    assert [side for side, _, _ in builtin_phases("turn")] == ["R", "L", "R", "L", "R", "L", "R"]
+    for segment in ("pelvis", "chest", "head", "l_foot", "r_foot"):
+        turned = np.degrees(yaw("turn", segment) - yaw("turn", segment)[0])
+        assert turned[-1] == pytest.approx(90.0)
+        assert np.diff(turned).min() > -1e-9, "never back"
+    between = np.degrees(yaw("turn", "l_foot") - yaw("turn", "r_foot"))
+    assert between.max() < 30.0 and between.min() > -10.0
+    middle = 0.25 * sum(point("turn", f"{side}_{part}") for side in "lr" for part in ("ankle", "toe"))
+    assert np.linalg.norm((middle[-1] - middle[0])[:2]) < 1e-3
+
+
+def test_stroll_takes_six_short_steps_straight_ahead() -> None:
+    assert [side for side, _, _ in builtin_phases("stroll")] == ["L", "R"] * 3
+    assert all(1.5 <= end - begin <= 2.01 for _, begin, end in builtin_phases("stroll"))
+    for side in "lr":
+        travel = sole("stroll", side) - sole("stroll", side)[0]
+        assert travel[-1, 0] == pytest.approx(0.75)
+        assert np.abs(travel[:, 1]).max() < 1e-9
+    apart = (sole("stroll", "l") - sole("stroll", "r"))[on("stroll", "l") & on("stroll", "r"), 0]
+    assert np.abs(apart).max() == pytest.approx(0.15)
 
 
 def test_walk_goes_at_a_human_pace() -> None:

@@ -84,6 +84,23 @@ def test_the_mirrored_script_gives_the_mirrored_person(parameters: Parameters) -
 
 
 @settings(max_examples=50, deadline=None)
+@given(stands(), st.floats(-4.0, 4.0))
+def test_a_person_who_has_turned_is_the_same_person_turned(parameters: Parameters, heading: float) -> None:
+    c, s = np.cos(heading), np.sin(heading)
+    turn = np.array([[c, -s], [s, c]])
+    feet = parameters.feet + heading * np.array([0, 0, 0, 1, 0, 0])
+    feet[..., :2] = feet[..., :2] @ turn.T
+    turned = replace(parameters, feet=feet, com=parameters.com @ turn.T, heading=np.array([heading]))
+    landmarks, orientations = pose(BODY, parameters)
+    other, others = pose(BODY, turned)
+    np.testing.assert_allclose(other[..., :2], landmarks[..., :2] @ turn.T, atol=1e-7)
+    np.testing.assert_allclose(other[..., 2], landmarks[..., 2], atol=1e-7)
+    for before, after in zip(orientations[0], others[0], strict=True):
+        axes = matrix_from_quat(before)
+        np.testing.assert_allclose(matrix_from_quat(after)[:2], turn @ axes[:2], atol=1e-7)
+
+
+@settings(max_examples=50, deadline=None)
 @given(st.sampled_from("lr"), st.floats(0.25, 0.55), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2))
 def test_the_wrist_goes_where_it_is_asked_to(side: str, reach: float, azimuth: float, elevation: float) -> None:
     wanted = reach * np.array(

@@ -39,6 +39,7 @@ class Parameters:
     arms: (T, 2, 4) rad, left and right, of the line from shoulder to wrist against the chest: swung forwards from
         hanging (pi overhead), then spread to the own side (pi/2 lateral); elbow bent; elbow swivelled up and out.
     head: (T, 2) rad, yaw to the left and pitch down, against the chest.
+    heading: (T,) rad, where all above the feet faces, 0 along +x, to the left; the trunk turns and leans against it.
     """
 
     feet: Array
@@ -47,6 +48,7 @@ class Parameters:
     trunk: Array
     arms: Array
     head: Array
+    heading: Array | float = 0.0
 
 
 def pose(body: Anthropometry, parameters: Parameters) -> tuple[Array, Array]:
@@ -55,7 +57,8 @@ def pose(body: Anthropometry, parameters: Parameters) -> tuple[Array, Array]:
     Raises UnreachablePose when a leg is too short for its foot.
     """
     feet = [_turn(parameters.feet[:, i, 3:]) for i in range(2)]
-    pelvis, chest = _turn(PELVIS_SHARE * parameters.trunk), _turn(parameters.trunk)
+    faced = np.multiply.outer(np.broadcast_to(parameters.heading, len(parameters.com)), (1.0, 0.0, 0.0))
+    pelvis, chest = _turn(PELVIS_SHARE * parameters.trunk + faced), _turn(parameters.trunk + faced)
     head = chest * _turn(np.column_stack([parameters.head, np.zeros(len(parameters.head))]))
     landmarks = np.full((len(parameters.com), len(LANDMARKS), 3), np.nan)
     orientations = {"pelvis": pelvis, "chest": chest, "head": head, "l_foot": feet[0], "r_foot": feet[1]}

@@ -21,8 +21,8 @@ class Script:
     duration s. stance: where the left and right foot stand at the beginning. offset: centre of mass on the line from
     the left (0) to the right (1) foot's centre. height: m of mid-hip above the floor. trunk, left_arm, right_arm,
     head: as in ``Parameters``. swings: in order of time. path: centre of mass over the floor, (T, 2) m, instead of the
-    offset. hands: opening of left and right hand, (T, 2), 0 closed to 1 open, None where nothing is known of it. rate:
-    frames a second.
+    offset. hands: opening of left and right hand, (T, 2), 0 closed to 1 open, None where nothing is known of it.
+    heading: where the body faces, rad to the left of +x, whatever its trunk does. rate: frames a second.
     """
 
     duration: float
@@ -36,6 +36,7 @@ class Script:
     swings: tuple[Swing | Stride, ...] = ()
     path: Curve | None = None
     hands: Curve | None = None
+    heading: Curve = field(default=Track(0.0))
     rate: float = 100.0
 
     @property
@@ -57,6 +58,7 @@ def parameters(script: Script, body: Anthropometry) -> Parameters:
         trunk=script.trunk(time),
         arms=np.stack([script.left_arm(time), script.right_arm(time)], axis=1),
         head=script.head(time),
+        heading=script.heading(time),
     )
 
 

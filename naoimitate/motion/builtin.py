@@ -34,6 +34,7 @@ from naoimitate.motion.stand import (
     standing,
     stepping,
 )
+from naoimitate.motion.stepping import sidestep, stroll, turn
 
 
 @dataclass(frozen=True)
@@ -288,6 +289,9 @@ BUILTINS = {
         Builtin("march", "four stands of 2 s on alternate feet", _march),
         Builtin("lean-and-pick", "on the left foot, right leg back, grasp far in front; drop aside", lean_and_pick),
         Builtin("step-and-pick", "two steps, grasp with the right hand, drop aside", step_and_pick),
+        Builtin("sidestep", "two slow steps to the left and two back, the other foot drawn up", sidestep),
+        Builtin("turn", "90 degrees to the left on the spot, in seven slow lifts", turn),
+        Builtin("stroll", "six slow steps ahead, each with the weight over one foot first", stroll),
         Builtin("walk", "eight steps straight ahead at a human pace", _walk),
     )
 }
