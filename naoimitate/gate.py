@@ -11,8 +11,9 @@ from numba import njit
 
 from naoimitate.balance.clearance import Clearance
 from naoimitate.balance.legs import Legs, table_bounds
+from naoimitate.balance.polygon import support_polygon
 from naoimitate.balance.pose import Pose
-from naoimitate.core.geometry import convex_hull, polygon_margin
+from naoimitate.core.geometry import polygon_margin
 from naoimitate.robot.model import RobotModel
 
 Array = npt.NDArray[np.float64]
@@ -84,20 +85,7 @@ def speed_ratio(model: GateModel, q: Array, before: Array, dt: float) -> float:
 @njit(cache=True)
 def support_margin(legs: Legs, sole_pos: Array, sole_rot: Array, left: bool, right: bool, com: Array) -> float:
     """Signed distance of the CoM's ground projection to the edge of the stance outlines' convex hull, m."""
-    count = legs.outline.shape[1]
-    points = np.empty((count * (int(left) + int(right)), 2))
-    row = 0
-    for side in range(2):
-        if (side == 0 and left) or (side == 1 and right):
-            for k in range(count):
-                for a in range(2):
-                    points[row, a] = (
-                        sole_pos[side, a]
-                        + sole_rot[side, a, 0] * legs.outline[side, k, 0]
-                        + sole_rot[side, a, 1] * legs.outline[side, k, 1]
-                    )
-                row += 1
-    return polygon_margin(convex_hull(points), com[0], com[1])
+    return polygon_margin(support_polygon(legs, sole_pos, sole_rot, left, right), com[0], com[1])
 
 
 @njit(cache=True)

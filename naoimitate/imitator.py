@@ -284,9 +284,9 @@ class Imitator:
         return self._retargeting.offset
 
     @property
-    def may_lift(self) -> bool:
-        """Whether a foot could be lifted now: the CoM has come to rest over the other one."""
-        return self._retargeting.may_lift
+    def settled(self) -> bool:
+        """Whether a foot could be lifted now and nothing would sway: the CoM has come to rest over the other one."""
+        return self._retargeting.settled
 
     @property
     def lag(self) -> float:

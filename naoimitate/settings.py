@@ -38,5 +38,5 @@ class Settings:
     gate: GateLimits = field(default_factory=GateLimits)
 
 
-PAPER = Settings(retarget="paper", reference="reachable", paper_ik=PaperIk())
+PAPER = Settings(retarget="paper", reference="reachable", paper_ik=PaperIk(), offset=OffsetLaw(shift="parabola"))
 """Koenemann 2014: damping 0.3, 30 arm and 5 leg iterations, 1 mm and 0.033 rad, the robot's own T-pose."""

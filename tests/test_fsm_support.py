@@ -12,6 +12,7 @@ from naoimitate.balance.offset import OffsetLaw, Push, advance
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, next_mode, offset_target, wanted_stance
 from naoimitate.fsm.support import OFFSET_REACHED
 
+PARABOLA = OffsetLaw(shift="parabola")
 D, L, R = Mode.DOUBLE, Mode.LEFT, Mode.RIGHT
 ON_LEFT, ON_RIGHT = Mode.LANDING_ON_LEFT, Mode.LANDING_ON_RIGHT
 LEFT_BAD, RIGHT_BAD = (False, True), (True, False)
@@ -180,7 +181,8 @@ class Walker:
         seen = SupportInput(human, self.offset, before.landing and self.height == 0.0, low, ok, ahead)
         mode = self.fsm.step(seen)
         target = offset_target(mode, seen, human_offset)
-        self.offset, self.speed = advance(self.offset, self.speed, target, DT, OffsetLaw(), Push(3.0, 3.0, 3.0))
+        push = Push(PARABOLA.parabola(self.offset), 3.0, 3.0, 3.0)
+        self.offset, self.speed = advance(self.offset, self.speed, target, DT, push)
         if before.landing and mode is D:
             self.good = not (self.bad_landings and self.bad_landings.pop())
         if mode in (L, R):

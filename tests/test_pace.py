@@ -15,7 +15,7 @@ from naoimitate.core.frames import Motion
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
 from naoimitate.run.pace import AutoPace, ConstantPace, PaceSettings, phases
 
-LAW, DT = OffsetLaw(), 0.02
+LAW, DT = OffsetLaw(shift="parabola"), 0.02
 STEPS = st.lists(st.tuples(st.sampled_from("DLRF"), st.floats(0.05, 1.5)), min_size=1, max_size=8)
 
 
@@ -40,7 +40,8 @@ class Robot:
         given = SupportInput(human, self.offset, self.fsm.mode.landing and self.height == 0.0, ahead=ahead)
         mode = self.fsm.step(given)
         target = offset_target(mode, given, 0.5)
-        self.offset, self.speed = advance(self.offset, self.speed, target, dt, LAW, Push(3.0, 3.0, 3.0))
+        push = Push(LAW.parabola(self.offset), 3.0, 3.0, 3.0)
+        self.offset, self.speed = advance(self.offset, self.speed, target, dt, push)
         rising = mode in (Mode.LEFT, Mode.RIGHT)
         self.height = min(self.height + 2.0 * dt, 0.3) if rising else max(self.height - dt, 0.0)
 

@@ -25,7 +25,7 @@ _MODES = {"D": Mode.DOUBLE, "L": Mode.LEFT, "R": Mode.RIGHT}
 class Direct:
     """The feet where the mapping puts them; the torso as the person's; the lower sole on the floor."""
 
-    may_lift = True
+    settled = True
 
     def __init__(self, robot: RobotModel, legs: Legs, maker: PoseMaker, planted: Planted, ik: PaperIk) -> None:
         self._robot, self._maker, self._planted, self._ik = robot, maker, planted, ik

@@ -157,5 +157,5 @@ class Prover:
         q, stance = pose.q.copy(), Stance(1, soles, rot, POSE, 0.0)
         low, high = pose.q - STEP, pose.q + STEP
         reach = Reach(1.0, low, high, low, high)
-        _, closure, _ = solve_legs(self._tree, self._legs, self._weights, stance, goal, q, reach, *rows)
+        closure = solve_legs(self._tree, self._legs, self._weights, stance, goal, q, reach, *rows).closure
         return self._maker.hang(q, 1, soles, rot) if closure < CLOSED else None

@@ -12,6 +12,7 @@ from numba import njit
 
 from naoimitate.balance.legs import POSE, LegGoal, Legs, Stance, reduce_columns, table_bounds
 from naoimitate.balance.retarget import Reach
+from naoimitate.balance.sway import turned
 from naoimitate.balance.tangent import Tangent, beyond, cross, over_floor, turn_columns
 from naoimitate.robot.kernel import moment_jacobian, momentum_of
 from naoimitate.robot.model import Tree
@@ -22,6 +23,9 @@ LEVER_STEP = 0.0005
 """[m] of lever by which an overloaded joint must be relieved in a frame."""
 LEVER_RATE = 8.0
 """[1/s] of what is left to its bound by which a lever may grow, so that the body arrives there slowly."""
+TABLE_RATE = 8.0
+"""[1/s] of what is left to a coupling table by which a joint may go on towards it: one that comes to its end at speed
+stops the whole body."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
 SWAY_SCALE = (1.0, 1.0, 10.0, 10.0, 10.0, 50.0, 50.0, 50.0)
@@ -58,37 +62,43 @@ def height_rows(legs: Legs, stance: Stance, t: Tangent, C: Array, b: Array, row:
 
 
 @njit(cache=True)
-def com_rows(t: Tangent, e_com: Array, slack: Array, C: Array, b: Array, row: int) -> int:
-    """The CoM's horizontal error (2,) m stays within slack (2,) m."""
-    n = t.at.shape[1]
+def com_rows(t: Tangent, along: Array, e_com: Array, slack: Array, C: Array, b: Array, row: int) -> int:
+    """The CoM's horizontal error (2,) m stays within slack (2,) m along a line (2,) and across it."""
     for k in range(2):
-        C[row, :n] = t.com_world[k]
-        row = _both_ways(C, b, row, e_com[k] - slack[k], e_com[k] + slack[k])
+        x, y = (along[0], along[1]) if k == 0 else (-along[1], along[0])
+        for i in range(t.com_world.shape[1]):
+            C[row, i] = x * t.com_world[0, i] + y * t.com_world[1, i]
+        error = x * e_com[0] + y * e_com[1]
+        row = _both_ways(C, b, row, error - slack[k], error + slack[k])
     return row
 
 
 @njit(cache=True)
 def load_rows(
     tree: Tree, legs: Legs, goal: LegGoal, t: Tangent, dt: float, most: Array, C: Array, b: Array, row: int
-) -> int:
+) -> tuple[int, float]:
     """What a hip or knee gives to hold the body up stays within what it can give.
 
     The torque over g M of a joint with axis a at p is ``a . (L x up)`` with ``L = w (c - p) - s``: the robot's weight,
     of which this leg carries the share w, minus the first moment s about p of the leg's own mass beyond the joint.
-    most: (2, M) m, the bounds of this frame of dt s; filled in where still zero.
+    most: (2, M) m, the bounds of this frame of dt s; filled in where still zero. Returns the next free row, and the
+    largest torque as a share of its bound.
     """
     ux, uy, uz = t.R[2]
+    load = 0.0
     for leg in range(2):
+        com = t.com + t.R.T @ goal.carried[leg]
         for k in range(legs.loaded.shape[1]):
             j = legs.loaded[leg, k]
             ax, ay, az = t.axes[0, j], t.axes[1, j], t.axes[2, j]
-            lx, ly, lz = _carried(t, j, goal.share[leg])
+            lx, ly, lz = _carried(t, j, goal.share[leg], com)
             cx, cy, cz = cross(lx, ly, lz, ux, uy, uz)
             lever = ax * cx + ay * cy + az * cz
+            load = max(load, abs(lever) / legs.holds[leg, k])
             if most[leg, k] == 0.0:
                 left = legs.holds[leg, k] * goal.overload - abs(lever)
                 most[leg, k] = abs(lever) + max(left * min(1.0, LEVER_RATE * dt) if left > 0.0 else left, -LEVER_STEP)
-            _load_row(tree, legs, goal.share[leg], t, j, C[row])
+            _load_row(tree, legs, goal.share[leg], t, j, com, C[row])
             cx, cy, cz = cross(ax, ay, az, lx, ly, lz)
             cx, cy, cz = cross(ux, uy, uz, cx, cy, cz)
             for i in range(t.turn.shape[1]):
@@ -96,23 +106,23 @@ def load_rows(
             row = _both_ways(C, b, row, -most[leg, k] - lever, most[leg, k] - lever)
             C[row - 2, -3], C[row - 1, -3] = 1.0, 1.0
     C[row, -3], b[row] = 1.0, 0.0
-    return row + 1
+    return row + 1, load
 
 
 @njit(cache=True)
-def _carried(t: Tangent, j: int, share: float) -> tuple[float, float, float]:
-    """L (3,) m of ``load_rows`` for joint j."""
+def _carried(t: Tangent, j: int, share: float, com: Array) -> tuple[float, float, float]:
+    """L (3,) m of ``load_rows`` for joint j, with the CoM at (3,) m."""
     own, p = beyond(t, j), t.pos[j + 1]
-    return share * (t.com[0] - p[0]) - own[0], share * (t.com[1] - p[1]) - own[1], share * (t.com[2] - p[2]) - own[2]
+    return share * (com[0] - p[0]) - own[0], share * (com[1] - p[1]) - own[1], share * (com[2] - p[2]) - own[2]
 
 
 @njit(cache=True)
-def _load_row(tree: Tree, legs: Legs, share: float, t: Tangent, j: int, out: Array) -> None:
+def _load_row(tree: Tree, legs: Legs, share: float, t: Tangent, j: int, com: Array, out: Array) -> None:
     """Derivative of ``a . (L x up)`` for joint j by the free variables while the base stays, into out."""
     ux, uy, uz = t.R[2]
     ax, ay, az = t.axes[0, j], t.axes[1, j], t.axes[2, j]
     sx, sy, sz = cross(ux, uy, uz, ax, ay, az)
-    own, L = beyond(t, j), _carried(t, j, share)
+    own, L = beyond(t, j), _carried(t, j, share, com)
     fx, fy, fz = cross(L[0], L[1], L[2], ux, uy, uz)
     hx, hy, hz = cross(ax, ay, az, fx, fy, fz)
     for i in range(legs.variable.shape[0]):
@@ -142,6 +152,8 @@ def sway_rows(legs: Legs, goal: LegGoal, t: Tangent, moved: Array, C: Array, b: 
     n = t.turn.shape[1]
     way = np.empty((8, n))
     _momentum_columns(legs, t, way[:3])
+    for i in range(n):
+        way[0, i], way[1, i] = turned(goal.along, way[0, i], way[1, i])
     way[2:5] = t.base
     way[5:] = -t.turn
     for a in range(8):
@@ -191,15 +203,19 @@ def joint_rows(legs: Legs, q: Array, start: Array, reach: Reach, C: Array, b: Ar
 
 
 @njit(cache=True)
-def table_rows(legs: Legs, q: Array, C: Array, b: Array, row: int) -> int:
-    """Coupling tables at the present angle: y_min(x) <= y <= y_max(x)."""
+def table_rows(legs: Legs, q: Array, dt: float, C: Array, b: Array, row: int) -> int:
+    """Coupling tables at the present angle: y_min(x) <= y <= y_max(x), approached slowly wherever the feet allow it."""
+    slow = min(1.0, TABLE_RATE * dt)
     for t in range(legs.table_x.shape[0]):
         jx, jy = legs.table_x[t], legs.table_y[t]
         low, low_slope, high, high_slope = table_bounds(legs.table_rows[t], q[jx])
         vx, vy = legs.variable[jx], legs.variable[jy]
         C[row, vy], C[row, vx], b[row] = 1.0, -low_slope, low + TABLE_RESERVE - q[jy]
         C[row + 1, vy], C[row + 1, vx], b[row + 1] = -1.0, high_slope, q[jy] - high + TABLE_RESERVE
-        row += 2
+        for k in range(2):
+            C[row + 2 + k, vy], C[row + 2 + k, vx] = C[row + k, vy], C[row + k, vx]
+            C[row + 2 + k, -2], b[row + 2 + k] = 1.0, slow * min(b[row + k], 0.0)
+        row += 4
     return row
 
 
@@ -227,4 +243,4 @@ def _both_ways(C: Array, b: Array, row: int, low: float, high: float) -> int:
 def count_rows(legs: Legs, stance: Stance, extra: int) -> int:
     """Rows that all these functions write at most."""
     other = 6 if stance.kind == POSE else legs.outline.shape[1]
-    return other + 4 + 2 * legs.loaded.size + 1 + 17 + 4 * legs.joints.shape[0] + 1 + 2 * legs.table_x.shape[0] + extra
+    return other + 4 + 2 * legs.loaded.size + 1 + 17 + 4 * legs.joints.shape[0] + 1 + 4 * legs.table_x.shape[0] + extra

@@ -11,6 +11,8 @@ the other foot is a constraint (planted, lifting, landing) or a task (swinging).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from numba import njit
@@ -35,6 +37,20 @@ from naoimitate.robot.model import Tree
 
 Array = npt.NDArray[np.float64]
 
+
+class Solution(NamedTuple):
+    """What came of a solve.
+
+    iterations: 0 where the first step is infeasible. closure: error of the other sole in m and rad, summed. com_error:
+    m. load: largest torque of a joint that holds the body up, as a share of its bound.
+    """
+
+    iterations: int
+    closure: float
+    com_error: float
+    load: float
+
+
 SLACKS = 3
 """Of load, smoothness and sway."""
 CONVERGED = 3e-4
@@ -54,13 +70,12 @@ def solve_legs(
     reach: Reach,
     rows: Array,
     bounds: Array,
-) -> tuple[int, float, float]:
+) -> Solution:
     """Move the leg joints of q (J,) rad towards the goal; the rest of q is given.
 
     rows: (C, n), bounds: (C,): extra rows ``rows (x - x0) >= bounds`` on the change of the free variables since the
     call (collisions).
-    Returns (iterations, closure error of the other sole in m and rad summed, CoM error m). q is left at the best
-    feasible point; where the first step is infeasible it is unchanged.
+    q is left at the best feasible point; where the first step is infeasible it is unchanged.
     """
     n, count = legs.joints.shape[0], q.shape[0]
     t, x = make_tangent(count, n), np.empty(n + SLACKS)
@@ -69,7 +84,7 @@ def solve_legs(
     H, g = np.empty((n + SLACKS, n + SLACKS)), np.empty(n + SLACKS)
     C = np.zeros((count_rows(legs, stance, rows.shape[0]), n + SLACKS))
     b = np.empty(C.shape[0])
-    closure, com_error = 0.0, 0.0
+    closure, com_error, load = 0.0, 0.0, 0.0
     limit, damping, done = int(weights.iterations), weights.damping, 0
     for iteration in range(limit + 1):
         place(tree, legs, stance, q, t)
@@ -79,16 +94,18 @@ def solve_legs(
         if iteration == limit or (iteration > 0 and np.abs(x[:n]).max() < CONVERGED and closure < CLOSED):
             break
         if iteration == 0:
-            slack[:] = np.maximum(weights.com_slack, np.abs(e_com))
+            ex, ey = goal.along
+            slack[0] = max(weights.com_slack, abs(ex * e_com[0] + ey * e_com[1]))
+            slack[1] = max(weights.com_slack_across, abs(ex * e_com[1] - ey * e_com[0]))
         differentiate(tree, legs, stance, goal.about, t)
         _tasks(legs, weights, stance, goal, t, q, e_pos, e_rot, e_com, damping, H, g)
         C[:] = 0.0
         row = pose_rows(t, e_pos, e_rot, C, b) if stance.kind == POSE else height_rows(legs, stance, t, C, b, 0)
-        row = com_rows(t, e_com, slack, C, b, row)
-        row = load_rows(tree, legs, goal, t, reach.dt, most, C, b, row)
+        row = com_rows(t, goal.along, e_com, slack, C, b, row)
+        row, load = load_rows(tree, legs, goal, t, reach.dt, most, C, b, row)
         row = sway_rows(legs, goal, t, moved, C, b, row)
         row = joint_rows(legs, q, start, reach, C, b, row)
-        row = table_rows(legs, q, C, b, row)
+        row = table_rows(legs, q, reach.dt, C, b, row)
         row = extra_rows(rows, bounds, moved, C, b, row)
         if _step(H, g, C[:row], b[:row], 6 if stance.kind == POSE else 0, x) != SOLVED:
             break
@@ -98,7 +115,7 @@ def solve_legs(
         for j in range(count):
             if legs.variable[j] >= 0:
                 q[j] += x[legs.variable[j]]
-    return done, closure, com_error
+    return Solution(done, closure, com_error, load)
 
 
 @njit(cache=True)

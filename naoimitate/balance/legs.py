@@ -63,7 +63,9 @@ class LegWeights(NamedTuple):
     foot: float = 1.0
     """Of the feet in the torso frame."""
     com_slack: float = 0.010
-    """[m] of CoM error along x and y that nothing may exceed (or increase, where it is already larger)."""
+    """[m] of CoM error along the line between the feet that nothing may exceed (or increase, where it is larger)..."""
+    com_slack_across: float = 0.025
+    """[m] ...and across it, where soles are long: what stops there at speed throws the zero moment point."""
     overload: float = 10.0
     """Price of m of lever by which a joint holds more than it should."""
     jerk: float = 1.0
@@ -181,17 +183,20 @@ class LegGoal(NamedTuple):
     """What is asked of the legs in one frame.
 
     feet: (2, 3) m, hip to sole in the torso frame, (5). com: (2,) m, world. foot_weight: (2,). share: (2,) of the
-    weight on each leg. overload: factor on what the loaded joints may hold. about: (3,) m, world; sway_low, sway_high:
-    (8,), soft bounds of ``Sway`` on what the legs add: x and y of the angular momentum about that point, m^2; the
-    torso's way along its own axes, m; its turn about them, rad.
+    weight that each leg carries, or will soon; carried: (2, 3) m, world, how far the CoM will have gone by then.
+    overload: factor on what the loaded joints may hold. about: (3,) m, along: (2,), world; sway_low,
+    sway_high: (8,), soft bounds of ``Sway`` on what the legs add: the angular momentum about that point, ``turned`` to
+    that line, m^2; the torso's way along its own axes, m; its turn about them, rad.
     """
 
     feet: Array
     com: Array
     foot_weight: Array
     share: Array
+    carried: Array
     overload: float
     about: Array
+    along: Array
     sway_low: Array
     sway_high: Array
 
@@ -199,7 +204,7 @@ class LegGoal(NamedTuple):
 def free_goal(feet: Array, com: Array, foot_weight: Array, share: Array) -> LegGoal:
     """A goal whose body may move as it likes."""
     free = np.full(8, np.inf)
-    return LegGoal(feet, com, foot_weight, share, 1.0, np.zeros(3), -free, free)
+    return LegGoal(feet, com, foot_weight, share, np.zeros((2, 3)), 1.0, np.zeros(3), np.array([0.0, 1.0]), -free, free)
 
 
 @njit(cache=True)

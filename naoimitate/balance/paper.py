@@ -117,7 +117,7 @@ class PaperFeet:
         return self._offset
 
     @property
-    def may_lift(self) -> bool:
+    def settled(self) -> bool:
         """The published machine waits for the offset alone."""
         return True
 
@@ -182,7 +182,7 @@ class PaperFeet:
         target = offset_target(self._fsm.step(given), given, footing.offset)
         centres = self._maker.centres(pose.sole_pos, pose.sole_rot)
         span = Span(float(np.linalg.norm(centres[1] - centres[0])), float(pose.com[2]), -np.inf, np.inf)
-        return advance(self._offset, self._speed, target, dt, self._law, self._law.push(self._offset, target, span))
+        return advance(self._offset, self._speed, target, dt, self._law.push(self._offset, target, span))
 
     def _mapped_soles(self, q_arms: Array, feet: Array) -> Soles:
         """The soles where the posture mapping puts them, feet (2, 3) m from the hips; beside each other, not inside."""

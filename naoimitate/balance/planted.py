@@ -12,6 +12,7 @@ from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Answer, Footing, Reach
 from naoimitate.balance.stride import Plan, Stride
 from naoimitate.balance.sway import Sway
+from naoimitate.balance.weight import Body
 from naoimitate.core.frames import GivenUp
 from naoimitate.core.geometry import (
     heading,
@@ -58,6 +59,7 @@ class Planted:
         self._tree, self._legs, self._maker, self._stride = robot.tree, legs, maker, stride
         self._weights, self._clearance, self._gate = weights, clearance, gate
         self._sway = Sway(robot)
+        self._speed, self._body = robot.speed, Body()
 
     @property
     def mode(self) -> Mode:
@@ -70,32 +72,37 @@ class Planted:
         return self._stride.offset
 
     @property
-    def may_lift(self) -> bool:
-        """Whether the body has been at rest over one foot for long enough to lift the other."""
-        return self._stride.may_lift
+    def settled(self) -> bool:
+        """Whether the body has been where it belongs for so long that nothing sways when a foot is lifted."""
+        return self._stride.settled and self._body.steady
 
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: the whole step, a part of it, or none, whatever passes the gate first."""
         stride = self._stride
-        plan = stride.plan(pose, footing, self._sway.calm, reach.dt)
+        plan = stride.plan(pose, footing, self._body, reach.dt)
         stances = (stride.mode.stance != "R", stride.mode.stance != "L")
         given_up = GivenUp.LANDING if plan.clipped else GivenUp(0)
         iterations = 0
         for scale in SCALES:
             q = pose.q + scale * (q_arms - pose.q)
-            done, closed = self._solve(q, plan, pose, feet, scale, reach)
+            done, closed, load = self._solve(q, plan, pose, feet, scale, reach)
             iterations += done
             candidate = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
-                stride.accept(plan, scale)
+                stride.accept(plan, scale, candidate, reach.dt)
                 self._sway.accept(pose, candidate, reach.dt)
+                hurry = float((np.abs(candidate.q - pose.q) / self._speed)[self._legs.joints].max()) / reach.dt
+                self._body = Body(self._sway.calm, self._sway.steady, hurry, load)
                 return Answer(candidate, given_up, iterations)
         stride.hold()
         self._sway.rest()
+        self._body = Body()
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
-    def _solve(self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach) -> tuple[int, bool]:
-        """Move the legs of q (J,) to ``scale`` of the plan; (iterations, whether the other sole is in place)."""
+    def _solve(
+        self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach
+    ) -> tuple[int, bool, float]:
+        """Move the legs of q (J,) to ``scale`` of the plan; (iterations, whether the other sole is in place, load)."""
         stride, other = self._stride, 1 - self._stride.side
         pos, rot = stride.planted_pos.copy(), stride.planted_rot.copy()
         pos[other], rot[other] = plan.sole_pos, plan.sole_rot
@@ -111,29 +118,39 @@ class Planted:
             foot_weight[:] = (LANDING_WEIGHT, LANDING_WEIGHT) if stride.mode.landing else (1.0, 1.0)
             foot_weight[other] = 0.0
         offset = stride.offset + scale * (plan.offset - stride.offset)
-        goal = free_goal(feet, stride.com_goal(offset), foot_weight, self._shares(offset))
+        share, carried = self._shares(offset, plan.target)
+        goal = free_goal(feet, stride.com_goal(offset), foot_weight, share)._replace(carried=carried)
         lowest = plan.min_height if scale == 1.0 else 0.0
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
         rows = self._clearance.leg_rows(moved, self._legs, stride.side, plan.kind != POSE)
-        about, low, high = self._sway.bounds(pose, moved, plan.sway, stride.shift(plan), reach.dt)
-        goal = goal._replace(about=about, sway_low=low, sway_high=high)
+        ground = stride.ground(pose)
+        about, low, high = self._sway.bounds(pose, moved, plan.sway, stride.shift(plan), ground, reach.dt)
+        goal = goal._replace(about=about, along=ground.along, sway_low=low, sway_high=high)
         ways = ((goal, rows[1]), (goal._replace(overload=np.inf), np.minimum(rows[1], 0.0)))
         start, iterations = q.copy(), 0
         for wish, bounds in ways:
             q[:] = start
-            done, closure, _ = solve_legs(self._tree, self._legs, weights, stance, wish, q, reach, rows[0], bounds)
-            iterations += done
-            if done > 0 and (plan.kind != POSE or closure < CLOSED):
-                return iterations, True
-        return iterations, False
+            found = solve_legs(self._tree, self._legs, weights, stance, wish, q, reach, rows[0], bounds)
+            iterations += found.iterations
+            if found.iterations > 0 and (plan.kind != POSE or found.closure < CLOSED):
+                return iterations, True, found.load
+        return iterations, False, 0.0
 
-    def _shares(self, offset: float) -> Array:
-        """How much of the weight the left and the right leg carry, (2,)."""
-        if self._stride.swinging:
-            return np.array([self._stride.side == 0, self._stride.side == 1], dtype=np.float64)
-        return np.array([1.0 - offset, offset])
+    def _shares(self, offset: float, target: float) -> tuple[Array, Array]:
+        """How much of the weight the left and the right leg carry, (2,), and how far it has gone by then, (2, 3) m.
+
+        A leg to which the weight is being shifted gets ready for all of it.
+        """
+        stride, carried = self._stride, np.zeros((2, 3))
+        if stride.swinging:
+            return np.array([stride.side == 0, stride.side == 1], dtype=np.float64), carried
+        share = np.array([1.0 - offset, offset])
+        side = 1 if target > offset else 0
+        carried[side, :2] = stride.com_goal(target) - stride.com_goal(offset)
+        share[side] = target if side == 1 else 1.0 - target
+        return share, carried
 
     def stand(self, q: Array) -> Pose:
         """Stand in double support as q (J,) rad does, its soles flat, its feet around the origin, facing +x."""
@@ -167,7 +184,7 @@ class Planted:
             low, high = pose.q - PLACE_STEP, pose.q + PLACE_STEP
             reach = Reach(PLACE_TIME, low, high, low, high)
             q = pose.q.copy()
-            _, closed = self._solve(q, Plan(offset, 0.0, position, rotation, POSE), pose, feet, 1.0, reach)
+            _, closed, _ = self._solve(q, Plan(offset, 0.0, offset, position, rotation, POSE), pose, feet, 1.0, reach)
             if closed:
                 stride.planted_pos[0], stride.planted_rot[0] = position, rotation
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)

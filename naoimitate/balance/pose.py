@@ -10,6 +10,7 @@ from numba import njit
 
 from naoimitate.balance.legs import POSE, Legs, Stance, base_pose
 from naoimitate.balance.offset import normalised_offset
+from naoimitate.balance.polygon import support_polygon
 from naoimitate.core.geometry import distance_to_edge
 from naoimitate.robot.kernel import forward
 from naoimitate.robot.model import RobotModel, Tree
@@ -56,6 +57,10 @@ class PoseMaker:
     def centres(self, sole_pos: Array, sole_rot: Array) -> Array:
         """Centroids of the sole outlines in the world, (2, 3) m: the foot centres of (6)."""
         return _centres(self._legs.centre, sole_pos, sole_rot)
+
+    def support_polygon(self, sole_pos: Array, sole_rot: Array, left: bool, right: bool) -> Array:
+        """Corners (N, 2) m, counter-clockwise, of the polygon under the soles that carry."""
+        return np.asarray(support_polygon(self._legs, sole_pos, sole_rot, left, right))
 
     def reach(self, sole_rot: Array, along: Array) -> tuple[float, float]:
         """How far (m) the left sole reaches from its centre against a direction (2,), and the right one along it."""

@@ -77,8 +77,8 @@ class Retargeting(Protocol):
         """The robot's normalised offset, 0 left to 1 right."""
 
     @property
-    def may_lift(self) -> bool:
-        """Whether the body has been where it belongs, at rest, for long enough to lift a foot."""
+    def settled(self) -> bool:
+        """Whether the body has been where it belongs for so long that nothing sways when a foot is lifted."""
 
     def place(self, q: Array, feet: Array, footing: Footing) -> Pose:
         """Stand in double support as near to the footing as the landing set allows, starting from q (J,) rad.

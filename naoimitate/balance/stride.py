@@ -9,25 +9,27 @@ import numpy.typing as npt
 
 from naoimitate.balance.landing import LandingSet
 from naoimitate.balance.legs import FREE, POSE, REACH
-from naoimitate.balance.offset import OffsetLaw, Span, advance
+from naoimitate.balance.offset import OffsetLaw, Span, normalised_offset
+from naoimitate.balance.polygon import room_around
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Footing
-from naoimitate.balance.sway import ONE_FOOT, QUIET, TWO_FEET, SwayLimits
+from naoimitate.balance.sway import ONE_FOOT, QUIET, TWO_FEET, Ground, SwayLimits
 from naoimitate.balance.swing import Phase, Swing, SwingSettings
+from naoimitate.balance.weight import Body, Weight
 from naoimitate.core.geometry import heading, wrap, yaw_matrix
 from naoimitate.fsm import Mode, SupportFsm, SupportInput, offset_target
-from naoimitate.fsm.support import OFFSET_REACHED, wanted_stance
+from naoimitate.fsm.support import wanted_stance
 
 Array = npt.NDArray[np.float64]
 
-LIFT_STILL = 0.1
-"""[s] for which the offset has been where it belongs before a foot is lifted: the servos have unloaded it by then."""
-COM_LATE = 0.003
-"""[m] by which the CoM may be off its place before the offset waits for it..."""
-PATIENCE = 0.15
-"""[s] ...and the time in which as much again is let pass: a CoM that cannot get there must not wait for ever."""
-COM_THERE = 0.006
-"""[m] by which it may be off its place over one foot when the other one is lifted."""
+COM_OFF = 0.004
+"""[m] by which the CoM may be off its place while a foot comes down: a leg that pulls it along lands elsewhere."""
+LEAD = 0.001
+"""[m] by which the offset may run ahead of the CoM."""
+ZMP_MARGIN = 0.020
+"""[m] by which the zero moment point stays inside the soles, whatever the body does..."""
+ZMP_LEAST = 0.003
+"""[m] ...and by which it may be off the CoM's projection in any case."""
 ONE_SIDED = 0.1
 """Share of the weight on a foot below which the other one stands alone."""
 _KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
@@ -37,14 +39,15 @@ _KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCE
 class Plan:
     """What one frame asks of the legs.
 
-    offset, offset_speed: the normalised offset to reach and its speed, 1/s. sole_pos (3,), sole_rot (3, 3): pose of the
-    sole on which the base does not hang. kind, min_height: as in ``legs.Stance``. sway: how
-    much the body may move. touchdown: the step ends with the
-    foot on the floor. clipped: the landing place is not the human's.
+    offset, offset_speed: the normalised offset to reach and its speed, 1/s. target: where it is going. sole_pos (3,),
+    sole_rot (3, 3): pose of the sole on which the base does not hang. kind, min_height: as in ``legs.Stance``. sway:
+    how much the body may move. touchdown: the step ends with the foot on the floor. clipped: the landing place is not
+    the human's.
     """
 
     offset: float
     offset_speed: float
+    target: float
     sole_pos: Array
     sole_rot: Array
     kind: int
@@ -65,8 +68,8 @@ class Stride:
         """Stand in double support on soles at (2, 3) m, (2, 3, 3) in the world with a normalised offset."""
         self._fsm = SupportFsm()
         self.planted_pos, self.planted_rot = planted_pos.copy(), planted_rot.copy()
-        self.offset, self._offset_speed = offset, 0.0
-        self.side, self._still, self._waited = 1, 0.0, 0.0
+        self._weight = Weight(self._law, offset)
+        self.side = 1
         self._swing: Swing | None = None
         self._good = self._can_stand_on_both()
 
@@ -81,15 +84,17 @@ class Stride:
         return self.mode is not Mode.DOUBLE
 
     @property
-    def may_lift(self) -> bool:
-        """Whether the offset has been where it belongs, and the body at rest, for long enough to lift a foot."""
-        return self._still > LIFT_STILL
+    def offset(self) -> float:
+        """The normalised offset, 0 left to 1 right."""
+        return self._weight.offset
 
-    def plan(self, pose: Pose, footing: Footing, calm: bool, dt: float) -> Plan:
-        """Advance the support machine, the offset and the swing foot by dt s from the present pose.
+    @property
+    def settled(self) -> bool:
+        """Whether the body has been where it belongs for so long that nothing sways when a foot is lifted."""
+        return self._weight.settled
 
-        calm: whether the body moves little enough for a foot to be lifted.
-        """
+    def plan(self, pose: Pose, footing: Footing, body: Body, dt: float) -> Plan:
+        """Advance the support machine, the offset and the swing foot by dt s from the present pose."""
         before = self.mode
         given = SupportInput(
             human=footing.support,
@@ -97,7 +102,7 @@ class Stride:
             descending=self._swing is not None and self._swing.phase is Phase.DESCEND,
             stance_ok=(True, True) if self.swinging else self._stance_ok(),
             ahead=footing.ahead,
-            may_lift=footing.may_lift and self.may_lift,
+            may_lift=footing.may_lift and self._weight.may_lift(body.steady),
         )
         if self._fsm.step(given) is not before:
             self._changed(before)
@@ -105,20 +110,15 @@ class Stride:
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         span = self._span(left, right, float(pose.com[2]))
         error = float(np.hypot(*(pose.com[:2] - self.com_goal(self.offset))))
-        late = self._is_late(error, dt)
-        there = abs(self.offset - target) < OFFSET_REACHED and not late and error < COM_THERE
-        self._still = self._still + dt if there and calm and not self.swinging else 0.0
-        wanted = self.offset if late else target
-        offset, speed = advance(
-            self.offset, self._offset_speed, wanted, dt, self._law, self._law.push(self.offset, wanted, span)
-        )
+        rests = body.calm and not self.swinging
+        offset, speed = self._weight.step(target, span, error, rests, body.pace, dt)
         if self._swing is None:
             self.planted_pos[:, 2] = np.maximum(self.planted_pos[:, 2] - self._swing_settings.touch_speed * dt, 0.0)
             other = 1 - self.side
-            lifting = there and (given.ahead or wanted_stance(self.mode, given) != "D")
+            lifting = self._weight.there and (given.ahead or wanted_stance(self.mode, given) != "D")
             sway = QUIET if lifting else self._sway_on_both()
-            return Plan(offset, speed, self.planted_pos[other], self.planted_rot[other], POSE, sway)
-        return self._swing_plan(self._swing, pose, footing, (offset, speed), dt)
+            return Plan(offset, speed, target, self.planted_pos[other], self.planted_rot[other], POSE, sway)
+        return self._swing_plan(self._swing, pose, footing, (offset, speed, target), error, dt)
 
     def _span(self, left: Array, right: Array, height: float) -> Span:
         """What the weight is shifted on, soles as they stand."""
@@ -132,18 +132,26 @@ class Stride:
         """Velocity (2,) m/s at which the CoM is to be shifted before and after a plan's frame."""
         left, right = self._maker.centres(self.planted_pos, self.planted_rot)
         line = (right - left)[:2]
-        return self._offset_speed * line, plan.offset_speed * line
+        return self._weight.speed * line, plan.offset_speed * line
 
-    def _is_late(self, error: float, dt: float) -> bool:
-        """Whether the CoM, ``error`` m off its place, is behind; for longer and longer only if it is farther off."""
-        self._waited = self._waited + dt if error > COM_LATE else 0.0
-        return error > COM_LATE * (1.0 + self._waited / PATIENCE)
+    def ground(self, pose: Pose) -> Ground:
+        """What the body stands on, and how far its zero moment point may move over that."""
+        left, right = self._maker.centres(self.planted_pos, self.planted_rot)
+        line = (right - left)[:2]
+        along = line / max(float(np.hypot(*line)), 1e-6)
+        stances = (self.mode.stance != "R", self.mode.stance != "L")
+        polygon = self._maker.support_polygon(self.planted_pos, self.planted_rot, *stances)
+        return Ground(along, room_around(polygon, *pose.com[:2], along, ZMP_MARGIN, ZMP_LEAST))
 
-    def _swing_plan(self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float], dt: float) -> Plan:
+    def _swing_plan(
+        self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float, float], error: float, dt: float
+    ) -> Plan:
         foot = 1 - self.side
         stance_yaw = heading(self.planted_rot[self.side])
         place, turn, clipped = self.landing.clip(foot, *self._landing_wish(swing, footing))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
+        if swing.phase is Phase.DESCEND and error > COM_OFF:
+            swing.stop()
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
@@ -162,19 +170,31 @@ class Stride:
             return place, turn
         return place + late * (self.landing.middle(1 - self.side) - place), (1.0 - late) * turn
 
-    def accept(self, plan: Plan, scale: float) -> None:
-        """``scale`` of the way to the plan was taken."""
-        self.offset += scale * (plan.offset - self.offset)
-        self._offset_speed = plan.offset_speed if scale == 1.0 else 0.0
+    def accept(self, plan: Plan, scale: float, pose: Pose, dt: float) -> None:
+        """``scale`` of the way to the plan was taken, within dt s.
+
+        On both feet the offset runs ahead of the CoM by a little at most: a plan far ahead of legs at their limits had
+        to be stopped at once. Under a free swing it goes with the CoM, which makes room for the swing. Around a
+        lift-off and a landing it does not give way: the CoM is to come back to its place.
+        """
+        offset = self.offset + scale * (plan.offset - self.offset)
+        if self._swing is None or self._swing.phase is Phase.FREE:
+            left, right = self._maker.centres(self.planted_pos, self.planted_rot)
+            here = normalised_offset(pose.com, left, right, self.offset)
+            lead = LEAD / max(float(np.hypot(*(right - left)[:2])), self._law.min_feet_distance)
+            lead = lead if self._swing is None else 0.0
+            offset = min(max(offset, here - lead), here + lead)
+        self._weight.move(offset, dt)
         if plan.touchdown and scale == 1.0:
             foot = 1 - self.side
             self.planted_pos[foot], self.planted_rot[foot] = plan.sole_pos, plan.sole_rot
             self._fsm.step(SupportInput(human="D", offset=self.offset, landed=True))
             self._swing, self._good = None, self._can_stand_on_both()
+            self._weight.stand(self._maker.offset(pose, self.offset))
 
     def hold(self) -> None:
         """The plan was not taken: offset and swing start again from rest."""
-        self._offset_speed = 0.0
+        self._weight.stand(self.offset)
         if self._swing is not None:
             self._swing.stop()
 

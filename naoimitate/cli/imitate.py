@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 @click.option("--method", type=click.Choice(["static"]), default="static", show_default=True, help="How to imitate.")
 @click.option(
     "--shift",
-    type=click.Choice(["parabola", "pendulum"]),
-    default="parabola",
+    type=click.Choice(["pendulum", "parabola"]),
+    default="pendulum",
     show_default=True,
-    help="How the weight goes from foot to foot: by the paper's speed law, or as fast as balance allows (on trial).",
+    help="How the weight goes from foot to foot: as fast as balance allows, or by the paper's speed law.",
 )
 @click.option(
     "--retarget",

@@ -71,7 +71,7 @@ class ConstantPace:
     def __init__(self, motion: Motion, start: float, factor: float) -> None:
         self._motion, self._factor, self.time = motion, factor, start
 
-    def next(self, dt: float, mode: Mode, offset: float, lag: float, may_lift: bool = True) -> Moment:
+    def next(self, dt: float, mode: Mode, offset: float, lag: float, settled: bool = True) -> Moment:
         """The moment dt s later."""
         self.time += self._factor * dt
         return Moment(self.time, self._motion.at(self.time).support or "D", "")
@@ -87,11 +87,11 @@ class AutoPace:
         self._shift = _shift_times(law)
         self.time, self._end = start, motion.duration
 
-    def next(self, dt: float, mode: Mode, offset: float, lag: float, may_lift: bool = True) -> Moment:
-        """Advance by at most dt s, given the robot's support mode, offset, lag in m, and whether it may lift a foot."""
+    def next(self, dt: float, mode: Mode, offset: float, lag: float, settled: bool = True) -> Moment:
+        """Advance by at most dt s, given the robot's support mode, offset, lag in m, and whether it has settled."""
         phase = self._phases[self._index]
         coming = self._coming()
-        can = may_lift or mode is not Mode.DOUBLE
+        can = settled or mode is not Mode.DOUBLE
         ready = coming is None or (can and _ready(coming.support, mode, offset)) or self._waited > self._s.patience
         landed = phase.support != "D" or mode is Mode.DOUBLE or self._waited > self._s.patience
         stop = math.inf
@@ -101,7 +101,7 @@ class AutoPace:
             stop = coming.start
         at_stop = self._advance(dt, self._wanted(phase, lag), stop)
         self._waited = self._waited + dt if at_stop else 0.0
-        if at_stop and stop == phase.end and phase.support in ("L", "R"):
+        if at_stop and stop == phase.end and phase.support != "D":
             return Moment(self.time, "D", coming.support if coming else "")
         return Moment(self.time, self._phases[self._index].support, self._ahead(offset))
 
@@ -148,7 +148,7 @@ def _shift_times(law: OffsetLaw) -> tuple[np.ndarray, np.ndarray]:
     offset, velocity, time, dt = 0.0, 0.0, 0.0, 0.01
     offsets, times = [offset], [time]
     while offset < 1.0 and time < 10.0:
-        offset, velocity = advance(offset, velocity, 1.0, dt, law, law.push(offset, 1.0, STANCE))
+        offset, velocity = advance(offset, velocity, 1.0, dt, law.push(offset, 1.0, STANCE))
         time += dt
         offsets.append(offset)
         times.append(time)

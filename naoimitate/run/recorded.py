@@ -119,7 +119,7 @@ def _play(
     moments, step_times = [first], [0.0]
     longest = 60.0 + LONGEST * (last - first)
     while law.time < last - 1e-9 and commands[-1].time < longest:
-        moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag, imitator.may_lift)
+        moment = law.next(dt, imitator.mode, imitator.offset, imitator.lag, imitator.settled)
         if moment.time > last + 1e-9:
             break
         begin = clock.perf_counter()

@@ -67,8 +67,8 @@ class _Timed:
         return self._inner.offset
 
     @property
-    def may_lift(self) -> bool:
-        return self._inner.may_lift
+    def settled(self) -> bool:
+        return self._inner.settled
 
     def stand(self, *arguments: Any) -> Pose:
         return self._inner.stand(*arguments)
