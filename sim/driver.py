@@ -11,6 +11,7 @@ import numpy as np
 from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.driver import RobotState
+from naoimitate.hw.feedback import feedback
 from naoimitate.hw.learning import LearningCompensation
 from naoimitate.hw.servo_command import ServoCommand, Target, servo_command, target_of
 from naoimitate.robot.model import RobotModel
@@ -28,8 +29,8 @@ class MujocoDriver:
 
     real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
     otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity; learning: for the
-    stiffness that the servos show, not just that of the settings. scene: adds objects to the robot's world. The hands
-    are closed until a command opens them.
+    stiffness that the servos show, not just that of the settings; balance: with the loops of ``hw.feedback``. scene:
+    adds objects to the robot's world. The hands are closed until a command opens them.
     """
 
     def __init__(
@@ -39,13 +40,16 @@ class MujocoDriver:
         *,
         compensation: bool = True,
         learning: bool = True,
+        balance: bool = False,
         real_time: bool = True,
         scene: Scene | None = None,
     ) -> None:
         self._settings = settings
         self._physics = Physics(robot, settings, scene)
         self._servos: ServoCommand
-        if compensation and learning:
+        if compensation and learning and balance:
+            self._servos = feedback(robot, settings.stiffness, settings.period)
+        elif compensation and learning:
             self._servos = LearningCompensation(robot, settings.stiffness, settings.period)
         else:
             self._servos = servo_command(robot, settings.stiffness if compensation else None)

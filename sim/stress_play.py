@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from naoimitate.core.falling import HEIGHT_LIMIT, TILT_LIMIT, has_tipped
 from naoimitate.core.frames import Array
+from naoimitate.hw.feedback import feedback
 from naoimitate.hw.servo_command import ServoCommand
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance
@@ -63,13 +64,17 @@ def play(
     disturbance: Disturbance,
     *,
     known_stiffness: bool = False,
+    closed: bool = False,
     control: ServoCommand | None = None,
 ) -> Outcome:
     """Play a plan under a disturbance until its end or until the robot lies.
 
     known_stiffness: the driver divides by the stiffness that its servos really have; else by the nominal one.
-    control: a closed loop in place of the driver's gravity compensation.
+    closed: the driver's own loops are closed (``hw.feedback``). control: a closed loop in place of all that.
     """
+    stiffness = disturbance.stiffness if known_stiffness else SimSettings.stiffness
+    if closed and control is None:
+        control = feedback(robot, stiffness, float(np.median(np.diff(plan.time))))
     result = simulate(
         robot,
         plan.time,
@@ -78,7 +83,7 @@ def play(
         plan.base_quat,
         plan.support,
         hand_opening=plan.hand_opening,
-        stiffness=disturbance.stiffness if known_stiffness else SimSettings.stiffness,
+        stiffness=stiffness,
         disturbance=disturbance,
         control=control,
         until_tipped=True,

@@ -29,19 +29,27 @@ class _Bench(NamedTuple):
     robot: RobotModel
     plans: tuple[Plan, ...]
     known_stiffness: bool
+    closed: bool
 
     def play(self, trial: Trial) -> Outcome:
         plan = self.plans[trial.plan]
-        return play(self.robot, plan, trial.disturbance, known_stiffness=self.known_stiffness)
+        how = {"known_stiffness": self.known_stiffness, "closed": self.closed}
+        return play(self.robot, plan, trial.disturbance, **how)
 
 
 class Pool(AbstractContextManager["Pool"]):
     """Plays trials with ``jobs`` processes, with one in this process; a context manager."""
 
     def __init__(
-        self, robot: RobotModel, plans: Sequence[Plan], *, jobs: int = 1, known_stiffness: bool = False
+        self,
+        robot: RobotModel,
+        plans: Sequence[Plan],
+        *,
+        jobs: int = 1,
+        known_stiffness: bool = False,
+        closed: bool = False,
     ) -> None:
-        self._bench = _Bench(robot, tuple(plans), known_stiffness)
+        self._bench = _Bench(robot, tuple(plans), known_stiffness, closed)
         self._executor: ProcessPoolExecutor | None = None
         if jobs > 1:
             context = multiprocessing.get_context("spawn")  # a fork would take the locks of our threads along

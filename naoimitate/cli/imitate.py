@@ -56,6 +56,17 @@ if TYPE_CHECKING:
 @click.option(
     "--sim/--no-sim", default=False, show_default=True, help="Play the run on the servos of the simulated robot."
 )
+@click.option(
+    "--sim-stiffness",
+    type=types.STIFFNESS,
+    help="Of the simulated servos, N m/rad; the driver is not told.  [default: 300]",
+)
+@click.option(
+    "--feedback/--no-feedback",
+    default=False,
+    show_default=True,
+    help="Let the simulated robot's driver learn its servos and balance by its sensors.",
+)
 @click.option("--video", type=types.VIDEO_FILE, help="Write a video of person and robot.")
 @click.option("--report", type=types.REPORT_FILE, help="Write a report: scores and plots in one HTML file.")
 def imitate(motion: str, **options: Any) -> None:
@@ -73,6 +84,8 @@ def imitate(motion: str, **options: Any) -> None:
     from naoimitate.run.recorded import imitate as run_recorded
     from naoimitate.run.report import write_report
 
+    if not options["sim"] and (options["sim_stiffness"] is not None or options["feedback"]):
+        raise click.UsageError("--sim-stiffness and --feedback are of the simulated robot: add --sim")
     keep_apart((motion, options["subject"], options["skeleton"]), [options[key] for key in ("out", "video", "report")])
     robot = load_robot(options["robot"], options["robot_version"])
     person = read_motion(motion, **{key: options[key] for key in ("tpose_at", "fps", "unit", "up", "skeleton")})
@@ -81,7 +94,7 @@ def imitate(motion: str, **options: Any) -> None:
     with progress(f"imitating {person.name}") as advance:
         run = run_recorded(person, robot, progress=advance, **_choices(options))
     if options["sim"]:
-        run = simulated(run, robot)
+        run = simulated(run, robot, options["sim_stiffness"], options["feedback"])
     save(run, options["out"])
     if options["video"]:
         write_pictures(run, robot, person, video=options["video"], strip=None)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+import numpy as np
 
 if TYPE_CHECKING:
     from naoimitate.core.frames import Motion
@@ -14,14 +15,32 @@ if TYPE_CHECKING:
     from naoimitate.run.file import Run
 
 
-def simulated(run: Run, robot: RobotModel) -> Run:
-    """The run with what the simulated robot made of it."""
+def simulated(run: Run, robot: RobotModel, stiffness: float | None = None, closed: bool = False) -> Run:
+    """The run with what the simulated robot made of it.
+
+    stiffness: N m/rad of its servos, which nobody tells the driver. closed: whether the driver's loops are closed.
+    """
     from naoimitate.cli.progress import progress
+    from naoimitate.hw.feedback import feedback
+    from naoimitate.hw.servo_command import servo_command
+    from naoimitate.sim.settings import SimSettings
     from naoimitate.sim.simulate import simulate
 
+    nominal, period = SimSettings.stiffness, float(np.median(np.diff(run.time))) if len(run) > 1 else SimSettings.period
+    control = feedback(robot, nominal, period) if closed else servo_command(robot, nominal)
     with progress("simulating") as advance:
-        plan = run.time, run.q, run.base_pos, run.base_quat, run.support
-        result = simulate(robot, *plan, hand_opening=run.hand_opening, progress=advance)
+        result = simulate(
+            robot,
+            run.time,
+            run.q,
+            run.base_pos,
+            run.base_quat,
+            run.support,
+            hand_opening=run.hand_opening,
+            stiffness=nominal if stiffness is None else stiffness,
+            control=control,
+            progress=advance,
+        )
     return dataclasses.replace(
         run,
         sim_base_pos=result.base_pos,

@@ -42,6 +42,7 @@ WIDTH = 120
 @click.option(
     "--known-stiffness", is_flag=True, help="The driver knows how stiff its servos are; else it takes them for nominal."
 )
+@click.option("--feedback", is_flag=True, help="The driver learns its servos and balances by its sensors.")
 @click.option("--speed", type=types.FACTOR_OR_AUTO, default=1.0, show_default=True, help="As in imitate.")
 @click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
@@ -90,7 +91,8 @@ def _pool(robot: RobotModel, plans: Sequence[Plan], options: dict[str, Any], tit
     from naoimitate.sim.stress_pool import Pool
 
     jobs = options["jobs"] or len(os.sched_getaffinity(0))
-    with Pool(robot, plans, jobs=jobs, known_stiffness=options["known_stiffness"]) as pool, progress(title) as told:
+    how = {"known_stiffness": options["known_stiffness"], "closed": options["feedback"]}
+    with Pool(robot, plans, jobs=jobs, **how) as pool, progress(title) as told:
         yield pool, told
 
 
@@ -205,6 +207,8 @@ def _repeat(case: Case, options: dict[str, Any]) -> str:
         words.append(f"--only {case.part}")
     if options["known_stiffness"]:
         words.append("--known-stiffness")
+    if options["feedback"]:
+        words.append("--feedback")
     if not case.motion.endswith(".npz") and options["speed"] != 1.0:
         words.append(f"--speed {options['speed']}")
     if options["robot"] != "nao":

@@ -83,6 +83,7 @@ def is_writable(folder: Path) -> bool:
 
 FACTOR_OR_AUTO = Number("FACTOR", least=0.05, most=20.0, words=("auto",))
 """Slower, a run would meet the bound on its length before it ends; faster, nothing is left to follow."""
+STIFFNESS = Number("K", least=10.0, most=10000.0)
 SECONDS = Number("S")
 MOMENT = Number("S", words=("auto", "none"))
 FILE_RATE = Number("HZ", least=1.0, most=10000.0)

@@ -1,0 +1,17 @@
+"""Every closed loop that a driver can run on top of gravity compensation, together."""
+
+from __future__ import annotations
+
+from naoimitate.core.frames import Array
+from naoimitate.hw.learning import LearningCompensation
+from naoimitate.hw.servo_command import ServoCommand
+from naoimitate.hw.stabiliser import Stabiliser
+from naoimitate.robot.model import RobotModel
+
+
+def feedback(robot: RobotModel, stiffness: Array | float, period: float) -> ServoCommand:
+    """Gravity compensation that learns how soft the servos are, under balance from what the robot measures.
+
+    stiffness: what the servos are taken for, (J,) or one for all, N m/rad. period: s between two calls.
+    """
+    return Stabiliser(robot, LearningCompensation(robot, stiffness, period), period)
