@@ -15,7 +15,7 @@ from naoimitate.robot.model import RobotModel
 
 FARTHEST = 0.16
 """[rad] by which a joint may leave its plan: a shift of 2 cm turns the ankles by 0.12."""
-ARRIVED = 0.001
+ARRIVED = 0.003
 """[m] by which the CoM may be off its place after a solve: legs that twist for the last of it are at their limits."""
 CLOSED = 1e-4
 """Sum of m and rad by which the other sole may be off after a solve."""
@@ -46,10 +46,11 @@ class PlantedShift:
         polygon = support_polygon(self._legs, pose.sole_pos, pose.sole_rot, support != "R", support != "L")
         return np.asarray(room_around(polygon, pose.com[0], pose.com[1], _forward(pose), margin, 0.0))
 
-    def moved(self, target: Target, shift: Array, raised: float) -> Array | None:
+    def moved(self, target: Target, shift: Array, raised: float, low: Array, high: Array) -> Array | None:
         """Joint angles (J,) rad of a target with its CoM shifted by (2,) m and its other sole raised by m.
 
-        The soles keep their places and directions. None where the legs cannot do it.
+        The soles keep their places and directions. low, high: (J,) rad, of the angles that may be asked for. None where
+        the legs cannot do it.
         """
         side, pose = self.side(target.support), self.pose(target.q, target.support)
         sole_pos, sole_rot = pose.sole_pos.copy(), pose.sole_rot.copy()
@@ -59,7 +60,7 @@ class PlantedShift:
         feet = pose.soles_in_base - self.hips - way @ pose.base_rot
         goal = free_goal(feet, pose.com[:2] + way[:2], np.ones(2), np.array([0.5, 0.5]))
         goal = goal._replace(overload=np.inf)
-        low, high = target.q - FARTHEST, target.q + FARTHEST
+        low, high = np.maximum(low, target.q - FARTHEST), np.minimum(high, target.q + FARTHEST)
         q = target.q.copy()
         stance = Stance(side, sole_pos, sole_rot, POSE, 0.0)
         reach = Reach(1.0, low, high, low, high)

@@ -28,7 +28,7 @@ from naoimitate.hw.planted_shift import PlantedShift, level
 from naoimitate.hw.servo_command import ServoCommand, Target
 from naoimitate.robot.model import RobotModel
 
-PARTS = (1.0, 0.8, 0.6, 0.4, 0.2)
+PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)
 """Of the corrections that are tried, in this order, until the legs can do it."""
 
 
@@ -92,13 +92,13 @@ class Stabiliser:
         self.target: Target | None = None
         """What was asked of the servos last."""
         stand = robot.postures["stand"]
-        self._planted.moved(Target(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D"), np.full(2, 1e-3), 1e-3)
+        upright = Target(stand, np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), "D")
+        self._planted.moved(upright, np.full(2, 1e-3), 1e-3, stand - 1.0, stand + 1.0)  # compiles
 
     def __call__(self, target: Target, state: RobotState) -> Array:
         """Servo angles (J,) rad for a target, moved as far as the state asks for."""
         self._look(target, state)
-        step = self._s.joint_speed * self._period
-        self._offset = self._offset + np.clip(self._wanted(target) - self._offset, -step, step)
+        self._offset = self._wanted(target)
         q = np.clip(target.q + self._offset, self._robot.lower, self._robot.upper)
         self.target = target._replace(q=q if self._offset.any() else target.q)
         return self._inner(self.target, state)
@@ -166,12 +166,14 @@ class Stabiliser:
         """How far (J,) rad the joints are to be beside the target; what the legs cannot do is given up."""
         side = self._planted.side(target.support)
         raised = float(self.raised[1 - side] - self.raised[side])
-        if not self.shift.any() and raised == 0.0:
-            return np.zeros_like(self._offset)
+        if not self.shift.any() and raised == 0.0 and not self._offset.any():
+            return self._offset
+        step = self._s.joint_speed * self._period
+        near = target.q + self._offset
         for part in PARTS:
-            q = self._planted.moved(target, part * self.shift, part * raised)
+            q = self._planted.moved(target, part * self.shift, part * raised, near - step, near + step)
             if q is not None:
                 self.shift, self.raised = part * self.shift, part * self.raised
                 return q - target.q
         self.shift, self.raised = np.zeros(2), np.zeros(2)
-        return np.zeros_like(self._offset)
+        return np.clip(np.zeros_like(self._offset), self._offset - step, self._offset + step)

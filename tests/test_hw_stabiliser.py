@@ -158,7 +158,7 @@ def _check_stance(target: Target, q: np.ndarray) -> None:
     if left and right:
         level = np.array([1.0, 1.0, 0.0])
         places = after.sole_pos[1] * level, after.sole_rot[1], before.sole_pos[1] * level, before.sole_rot[1]
-        assert outline_travel(LEGS, 1, *places) < 2e-3, "soles keep their places"
+        assert outline_travel(LEGS, 1, *places) < 1e-4, "soles keep their places"
         assert abs(after.sole_pos[1, 2]) <= 2.0 * DEFAULT.step_height + 1e-3
     planned = support_margin(LEGS, before.sole_pos, before.sole_rot, left, right, before.com)
     margin = support_margin(LEGS, after.sole_pos, after.sole_rot, left, right, after.com)
