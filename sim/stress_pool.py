@@ -33,8 +33,7 @@ class _Bench(NamedTuple):
 
     def play(self, trial: Trial) -> Outcome:
         plan = self.plans[trial.plan]
-        how = {"known_stiffness": self.known_stiffness, "closed": self.closed}
-        return play(self.robot, plan, trial.disturbance, **how)
+        return play(self.robot, plan, trial.disturbance, known_stiffness=self.known_stiffness, closed=self.closed)
 
 
 class Pool(AbstractContextManager["Pool"]):
