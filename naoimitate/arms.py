@@ -15,6 +15,7 @@ from naoimitate.balance.pose import Pose
 from naoimitate.balance.retarget import Reach
 from naoimitate.branch import Branch
 from naoimitate.core.geometry import yaw_matrix
+from naoimitate.gaze import Gaze
 from naoimitate.human.observer import Observation
 from naoimitate.ik import SOLVED, bounded_step
 from naoimitate.limb import Limb, LimbWeights, build_limb, solve_limb, solve_limb_fixed
@@ -46,16 +47,22 @@ class Arms:
     """Both arms and the head of a robot."""
 
     def __init__(
-        self, robot: RobotModel, weights: LimbWeights, reserve: float, orientation: str, paper: PaperIk | None
+        self,
+        robot: RobotModel,
+        weights: LimbWeights,
+        reserve: float,
+        orientation: str,
+        paper: PaperIk | None,
+        gaze: Gaze | None = None,
     ) -> None:
-        self._paper = paper
+        self._paper, self._gaze = paper, gaze
         self._robot, self._weights, self._orientation = robot, weights, orientation
         self._limbs = [build_limb(robot, f"{s}_arm", reserve) for s in "lr"]
         self._branches = [Branch(robot, limb) for limb in self._limbs]
         self._reserve = reserve
         self._to_goal = weights._replace(bend=0.0)
         self.reset()
-        self._head = robot.chains["head"]
+        self._head = robot.chains.get("head", ())
         self._table = next((t for t in robot.tables if t.y in self._head), None)
 
     def reset(self) -> None:
@@ -169,8 +176,12 @@ class Arms:
         return _FREE, 0
 
     def head(self, q: Array, wanted: tuple[float, float], step: float, low: Array, high: Array) -> None:
-        """Turn the head of q (J,) towards yaw and pitch (rad), at most ``step`` rad, within its coupling table."""
-        for joint, angle in zip(self._head, wanted, strict=False):
+        """Turn the head of q (J,) at most ``step`` rad, within its coupling table: towards yaw and pitch (rad) wanted.
+
+        A robot with a gaze looks at its hand instead; the arms of q are where they will be.
+        """
+        angles = wanted if self._gaze is None else self._gaze.angles(q)
+        for joint, angle in zip(self._head, angles, strict=False):
             near, far = max(low[joint], q[joint] - step), min(high[joint], q[joint] + step)
             lower, upper = self._robot.lower[joint] + self._reserve, self._robot.upper[joint] - self._reserve
             if self._table is not None and self._table.y == joint:

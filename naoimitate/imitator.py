@@ -26,6 +26,7 @@ from naoimitate.core.frames import GivenUp, HumanFrame, RobotCommand
 from naoimitate.core.geometry import heading, lengths, quat_from_matrix
 from naoimitate.fsm import Mode
 from naoimitate.gate import Gate
+from naoimitate.gaze import build_gaze
 from naoimitate.human.observer import Observation, Observer
 from naoimitate.limits import Follower, limited_step, reachable_angles
 from naoimitate.mapping import Mapping, reachable_mapping, virtual_mapping
@@ -56,7 +57,8 @@ class Imitator:
         self._maker = PoseMaker(robot, legs)
         self._hips = hip_positions(robot)
         self._farthest = FARTHEST * np.array([robot.limb_length[limb] for limb in ("l_arm", "l_leg", "r_arm", "r_leg")])
-        self._arms = Arms(robot, s.arm_weights, s.legs.range_reserve, s.hand_orientation, s.paper_ik)
+        gaze = build_gaze(robot, s.head, s.legs.range_reserve)
+        self._arms = Arms(robot, s.arm_weights, s.legs.range_reserve, s.hand_orientation, s.paper_ik, gaze)
         self._retargeting = self._build_retargeting(legs)
         self._subject: Subject | None = None
         self._standing = self._maker.stand(robot.postures["stand"].copy()).soles_in_base - self._hips

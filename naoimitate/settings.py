@@ -24,6 +24,8 @@ class Settings:
     """T-pose of the robot in (5): ``virtual`` (limits ignored) or ``reachable`` (its calibration posture)."""
     hand_orientation: str = "free"
     """``free``, ``upright`` or ``follow`` the person's hands."""
+    head: str = "follow"
+    """``follow`` the person's head, or look at the robot's own ``left-hand`` or ``right-hand`` (section VI-D)."""
     upper_body: bool = False
     """Whether the robot only stands, and imitates arms and head."""
     paper_ik: PaperIk | None = None

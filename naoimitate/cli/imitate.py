@@ -51,6 +51,13 @@ if TYPE_CHECKING:
     show_default=True,
     help="How the hands turn.",
 )
+@click.option(
+    "--head",
+    type=click.Choice(["follow", "left-hand", "right-hand"]),
+    default="follow",
+    show_default=True,
+    help="The head follows the person's, or looks at a hand of the robot.",
+)
 @click.option("--mirror", is_flag=True, help="The robot is the person's mirror image.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of everything random.")
 @click.option(
@@ -116,6 +123,7 @@ def _choices(options: dict[str, Any]) -> dict[str, Any]:
     settings = Settings(
         retarget=options["retarget"],
         hand_orientation=options["hand_orientation"],
+        head=options["head"],
         offset=OffsetLaw(shift=options["shift"]),
     )
     choices = {key: options[key] for key in ("speed", "rate", "sample", "start", "end", "seed")}

@@ -34,6 +34,13 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 @click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
 @click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
 @click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
+@click.option(
+    "--head",
+    type=click.Choice(["follow", "left-hand", "right-hand"]),
+    default="follow",
+    show_default=True,
+    help="The head follows the operator's, or looks at a hand of the robot.",
+)
 @click.option("--upper-body", is_flag=True, help="The robot stands, and imitates arms and head only.")
 @click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
 @click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
@@ -87,7 +94,7 @@ def _setup(chosen: dict[str, Any], header: dict[str, Any]) -> Setup:
     from naoimitate.live.setup import Setup
 
     setup = Setup.of(header.get("setup")) if header else Setup()
-    for option in ("speed_limit", "upper_body", "mirror"):
+    for option in ("speed_limit", "upper_body", "mirror", "head"):
         if option in chosen:
             setup = replace(setup, **{option: chosen[option]})
     if "no_filter" in chosen:

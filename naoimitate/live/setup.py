@@ -7,6 +7,7 @@ from typing import Any
 
 from naoimitate.calib.subject import parse_subject
 from naoimitate.core.errors import StreamError
+from naoimitate.gaze import HANDS
 from naoimitate.live.session import Session, SessionSettings
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import Settings
@@ -17,7 +18,8 @@ class Setup:
     """The operator's choices.
 
     speed_limit: share of the usual speeds. upper_body: the robot stands, and imitates arms and head only. mirror: the
-    operator faces the robot. filtered: landmarks are filtered. subject: text of a subject file, empty for none.
+    operator faces the robot. filtered: landmarks are filtered. subject: text of a subject file, empty for none. head:
+    as in ``Settings``.
     """
 
     speed_limit: float = 1.0
@@ -25,6 +27,7 @@ class Setup:
     mirror: bool = False
     filtered: bool = True
     subject: str = ""
+    head: str = "follow"
 
     def session(self, robot: RobotModel) -> Session:
         """A new session; CalibrationError where the subject's text is none."""
@@ -36,7 +39,7 @@ class Setup:
             head_speed=share * limits.head_speed,
             joint_share=share * limits.joint_share,
         )
-        settings = replace(Settings(), limits=slower, upper_body=self.upper_body)
+        settings = replace(Settings(), limits=slower, upper_body=self.upper_body, head=self.head)
         subject = parse_subject(self.subject, "the subject") if self.subject else None
         return Session(robot, settings, SessionSettings(filtered=self.filtered, mirror=self.mirror), subject)
 
@@ -52,6 +55,13 @@ class Setup:
         known = {f.name: header[f.name] for f in fields(Setup) if f.name in header}
         usual = asdict(Setup())
         for name, value in known.items():
-            if type(value) is not type(usual[name]) or (name == "speed_limit" and not 0.0 < value <= 1.0):
+            if type(value) is not type(usual[name]) or not _possible(name, value):
                 raise StreamError(f"this recording was set up with {name} = {value!r}, which cannot be: record it anew")
         return Setup(**known)
+
+
+def _possible(name: str, value: Any) -> bool:
+    """Whether a value of the right type can be the operator's choice."""
+    if name == "head":
+        return value == "follow" or value in HANDS
+    return name != "speed_limit" or 0.0 < value <= 1.0
