@@ -25,8 +25,8 @@ from naoimitate.sim.settings import SimSettings
 DIRECTIONS = {"front": 0.0, "front-left": 45.0, "left": 90.0, "back-left": 135.0, "back": 180.0}
 DIRECTIONS |= {"back-right": 225.0, "right": 270.0, "front-right": 315.0}
 """deg, of the push, from +x to +y."""
-FORCES = (60.0, 75.0, 90.0)
-"""N on the torso for ``PUSH`` s; 5.3 kg are 52 N."""
+FORCES = (67.0, 82.0, 100.0)
+"""N on the torso for ``PUSH`` s; 5.3 kg are 52 N. The postures were chosen with 60, 75 and 90 N."""
 PUSH, STAND, FALL, LOOK = 0.1, 0.3, 2.0, 0.02
 """s: of the push, before it, after it, and between two readings of the guard."""
 
