@@ -17,7 +17,8 @@ from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError, NaoimitateError
 from naoimitate.core.frames import RobotCommand
 from naoimitate.fsm.fall_latch import Action, FallLatch
-from naoimitate.hw.condition import WATCHED, Condition, Delays, GuardSettings, GuardStatus
+from naoimitate.hw.brace import braced, give_way
+from naoimitate.hw.condition import WATCHED, Condition, Delays, GuardSettings, GuardStatus, one_line
 from naoimitate.hw.driver import INTERRUPTED, Driver, RobotState
 from naoimitate.hw.lean import UPRIGHT, lean, turning
 from naoimitate.hw.letting_go import LettingGo
@@ -243,8 +244,10 @@ class GuardedDriver:
         self._lean = lean(UPRIGHT if self._command is None else self._command.base_quat, state.angles)
         action = self._latch.sense(self._lean, turning(state.gyro), state.fell, dt)
         if action is Action.SOFTEN:
+            obeys = self._settings.fall_response == "brace" and self._condition is Condition.LIVE
+            brace = braced(self._command, self._gate.postures, state.angles) if obeys else None
             self._alive = Condition.FALLING
-            self._try(lambda: self.__driver.soften(self._settings.fall_stiffness))
+            self._try(lambda: give_way(self.__driver, self._settings, brace))
         elif action is Action.STOP:
             self._end(Condition.FALLEN)
 
@@ -278,7 +281,7 @@ class GuardedDriver:
         try:
             yield self.__driver
         except Exception as error:  # a driver may fail in any way
-            self._problem = _line(error)
+            self._problem = one_line(error)
             self._end(Condition.STOPPED)
             if isinstance(error, NaoimitateError):
                 raise
@@ -289,11 +292,4 @@ class GuardedDriver:
         try:
             do()
         except Exception as error:  # a driver may fail in any way; the end goes on
-            self._problem = _line(error)
-
-
-def _line(error: Exception) -> str:
-    """What to tell an operator: an error that was meant for people as it is."""
-    if isinstance(error, NaoimitateError):
-        return str(error)
-    return f"the driver failed ({type(error).__name__}: {' '.join(str(error).split())})"
+            self._problem = one_line(error)

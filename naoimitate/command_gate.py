@@ -11,6 +11,7 @@ again. ``catch_up`` then gives the robot a way of its own: calm steps towards it
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -81,6 +82,8 @@ class CommandGate:
 
     def __init__(self, robot: RobotModel, limits: CommandLimits | None = None) -> None:
         self.limits = limits or CommandLimits()
+        self.postures: Mapping[str, Array] = robot.postures
+        """Of the robot, by name, (J,) rad."""
         self._model, self._legs, self._tree = build_gate(robot), build_legs(robot, LegLimits()), robot.tree
         self._coupled, self._between = robot.coupled, Between(robot)
         self._stance = {support: _carrying(robot, support) for support in CARRIES}

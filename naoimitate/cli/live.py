@@ -43,6 +43,9 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
 )
 @click.option("--upper-body", is_flag=True, help="The robot stands, and imitates arms and head only.")
 @click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
+@click.option(
+    "--fall", type=click.Choice(["limp", "brace"]), default="limp", show_default=True, help="Response to a fall."
+)
 @click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
 @click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
 @click.option("--duration", type=types.SECONDS, help="End after so many seconds.")
@@ -60,7 +63,7 @@ def live(context: click.Context, /, **options: Any) -> None:
     from naoimitate.cli.feeds import open_feed
     from naoimitate.cli.outputs import keep_apart
     from naoimitate.command_gate import CommandGate
-    from naoimitate.hw.guarded import GuardedDriver
+    from naoimitate.hw.guarded import GuardedDriver, GuardSettings
     from naoimitate.robot import load_robot
 
     source = options["source"].removeprefix("replay:")
@@ -71,7 +74,8 @@ def live(context: click.Context, /, **options: Any) -> None:
     setup = _setup(chosen, feed.header)
     gate = CommandGate(robot)
     driver = _driver(options, robot)
-    guarded, watch = GuardedDriver(driver, gate), _watch(options, driver)
+    settings = GuardSettings(fall_response=options["fall"])
+    guarded, watch = GuardedDriver(driver, gate, settings), _watch(options, driver)
     rig = Rig(feed, setup, setup.session(robot), guarded, gate, robot, watch)
     conduct(rig, options["duration"], options["out"], _recorder(rig, options))
 
