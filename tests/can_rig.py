@@ -104,3 +104,8 @@ def wait_for(condition: Callable[[], bool], patience: float = 2.0) -> bool:
             return True
         time.sleep(0.005)
     return condition()
+
+
+def all_follow(it: Rig, but: int = 0) -> bool:
+    """Whether every motor follows, but one that need not; those that held while the computer paused come again."""
+    return wait_for(lambda: {m.status for node, m in it.stub.motors.items() if node != but} == {"following"})

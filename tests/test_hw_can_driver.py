@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from can_rig import QUICK, UPRIGHT, Rig, command, rig, wait_for
+from can_rig import QUICK, UPRIGHT, Rig, all_follow, command, rig, wait_for
 
 from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError
@@ -145,7 +145,7 @@ def test_without_commands_it_keeps_the_last_target_and_the_motors_alive(nao: Rob
         assert wait_for(lambda: bool(np.abs(it.driver.read().q - q).max() < 2 * STEP))
         time.sleep(1.0)
         assert np.abs(it.driver.read().q - q).max() < 2 * STEP
-        assert {motor.status for motor in it.stub.motors.values()} == {"following"}
+        assert all_follow(it)
         assert it.driver.read().alarms == ()
 
 
@@ -192,7 +192,7 @@ def test_the_emergency_stop_ends_every_motion_and_is_over_after_a_new_start(nao:
         assert positions(it) == held
         assert "every motor has stopped following: stopped" in it.driver.read().faults
         it.driver.connect()
-        assert {motor.status for motor in it.stub.motors.values()} == {"following"}
+        assert all_follow(it)
         assert it.driver.read().alarms == ()
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import can
 import numpy as np
 import pytest
-from can_rig import Rig, command, rig, wait_for
+from can_rig import Rig, all_follow, command, rig, wait_for
 
 from naoimitate.core.errors import DriverError
 from naoimitate.hw.can import CanDriver
@@ -31,7 +31,7 @@ def test_a_silent_motor_is_a_fault_within_its_watchdog_and_the_others_go_on(nao:
         assert fault(it, "motor 11 (LKneePitch) is silent", 1.5)
         assert it.driver.read().faults == ("motor 11 (LKneePitch) is silent",)
         assert it.driver.read().alarms == ()
-        assert {motor.status for motor in it.stub.motors.values()} == {"following"}
+        assert all_follow(it)
 
 
 def test_a_motor_with_wrong_checksums_is_counted_and_a_fault_and_not_believed(nao: RobotModel) -> None:

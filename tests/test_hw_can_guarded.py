@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from can_rig import Rig, rig, wait_for
+from can_rig import Rig, all_follow, rig, wait_for
 
 from naoimitate import Imitator
 from naoimitate.calib.subject import calibrate
@@ -44,7 +44,7 @@ class Life:
         q[0] = 0.6 * np.sin(moment)  # slow enough that a stuck motor is away for long, wherever it sticks
         return replace(self._calm, time=moment, q=q)
 
-    def until(self, true: Callable[[GuardStatus], bool], patience: float = 5.0) -> bool:
+    def until(self, true: Callable[[GuardStatus], bool], patience: float = 20.0) -> bool:
         def turn() -> bool:
             self.guard.write(self.command())
             return true(self.guard.status)
@@ -93,9 +93,8 @@ def test_a_motor_that_fails_ends_the_motion_by_name_and_all_others_stay_stiff(
         life.guard.write(life.command())
         assert life.guard.command is held, "no command passes any more"
         assert held is not None
-        for node, motor in life.it.stub.motors.items():
-            if node != ill:
-                assert (motor.status, motor.stiffness) == ("following", 1.0)
+        assert {motor.stiffness for node, motor in life.it.stub.motors.items() if node != ill} == {1.0}
+        assert all_follow(life.it, but=ill)
         others = np.arange(len(nao.joint_names)) != nao.joint_names.index(what.split(":")[0])
         np.testing.assert_allclose(life.it.driver.read().q[others], held.q[others], atol=0.01)
 
@@ -116,7 +115,7 @@ def test_the_operator_stops_a_robot_in_fault_and_connects_it_again(nao: RobotMod
         assert life.guard.status.condition is Condition.STOPPED
         assert life.guard.status.problem == "motor 20 (RShoulderRoll) is silent"
         assert wait_for(lambda: {m.status for m in life.it.stub.motors.values()} == {"off"})
-        time.sleep(1.0)
+        time.sleep(2.0)  # the motor is on the bus again
         life.guard.reset()
         life.guard.connect()
         assert life.until(lambda status: status.accepted > 50)
@@ -134,4 +133,4 @@ def test_a_pause_of_the_computer_ends_nothing(nao: RobotModel, gate: CommandGate
         before = life.guard.status.accepted
         assert life.until(lambda status: status.accepted > before + 50)
         assert life.guard.status.condition is Condition.LIVE
-        assert {m.status for m in life.it.stub.motors.values()} == {"following"}
+        assert all_follow(life.it)
