@@ -100,6 +100,13 @@ def test_a_squat_is_followed_at_any_control_rate(nao: RobotModel, rate: float) -
     assert measures["rattle_frames"].value == 0
 
 
+@pytest.mark.parametrize("rate", [50.0, 100.0, 250.0])
+def test_a_squat_too_deep_for_the_robot_is_held_still(nao: RobotModel, rate: float) -> None:
+    """The second one; the person rests in it. A body at its limits does not go up and down there."""
+    run = imitate(builtin_motion("squat"), nao, rate=rate, start=9.0, end=15.5)
+    assert np.ptp(run.base_pos[run.time > 4.5], axis=0).max() < 0.003
+
+
 def test_hands_and_feet_of_the_papers_sequence(nao: RobotModel) -> None:
     """Better than the paper's 1.4 and 1.6 cm."""
     result = scored(nao, "paper")

@@ -9,7 +9,7 @@ import pytest
 
 from naoimitate.balance.legs import LegLimits, build_legs
 from naoimitate.balance.pose import Pose, PoseMaker
-from naoimitate.balance.sway import ONE_FOOT, QUIET, STEADY, TWO_FEET, Ground, Sway, SwayLimits
+from naoimitate.balance.sway import BRAKING, ONE_FOOT, QUIET, STEADY, TWO_FEET, Ground, Sway, SwayLimits
 from naoimitate.core.physics import GRAVITY
 from naoimitate.robot.model import RobotModel
 
@@ -60,13 +60,23 @@ def test_what_moves_may_go_on_and_need_not_stop_at_once(robot: RobotModel, pose:
     _, low, high = sway.bounds(pose, pose, ONE_FOOT, STILL, WIDE, DT)
     coasting = speed * DT * pose.com[2]
     assert low[1] <= high[1] < coasting, "faster than allowed: it has to brake"
-    assert coasting - high[1] == pytest.approx(GRAVITY * ONE_FOOT.zmp_across * DT**2)
+    assert coasting - high[1] == pytest.approx(BRAKING * GRAVITY * ONE_FOOT.zmp_across * DT**2)
     assert not sway.calm
     sway.rest()
     assert sway.calm
     assert sway.bounds(pose, pose, ONE_FOOT, STILL, WIDE, DT)[2] == pytest.approx(
         -sway.bounds(pose, pose, ONE_FOOT, STILL, WIDE, DT)[1]
     )
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_braking_ends_at_rest(robot: RobotModel, pose: Pose, way: float) -> None:
+    """Harder than it speeds up, but not so hard that it turns back faster than it could start."""
+    sway, change = Sway(robot), GRAVITY * TWO_FEET.zmp_across * DT**2
+    slow = 1.5 * change / pose.com[2]
+    sway.accept(lifted(pose, np.array([-way * slow, 0.0, 0.0])), pose, DT)
+    _, low, high = sway.bounds(pose, pose, TWO_FEET, STILL, WIDE, DT)
+    assert sorted(way * np.array([low[1], high[1]])) == pytest.approx([0.0, 2.5 * change])
 
 
 def test_what_the_arms_do_is_left_to_the_legs_to_make_up_for(robot: RobotModel, pose: Pose) -> None:

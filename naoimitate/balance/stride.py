@@ -151,7 +151,7 @@ class Stride:
         place, turn, clipped = self.landing.clip(foot, *self._landing_wish(swing, footing))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
         if swing.phase is Phase.DESCEND and error > COM_OFF:
-            swing.stop()
+            swing.go_up()
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )

@@ -25,6 +25,9 @@ Array = npt.NDArray[np.float64]
 
 STEADY = 0.010
 """[m] by which the zero moment point may be off the CoM's projection when a body at rest lifts a foot."""
+BRAKING = 2.0
+"""Times as hard as it speeds up may a body brake: one that stops only on as long a way as it took to get going passes
+its goal, comes back, and passes it again."""
 FLOOR = np.array([1.0, 1.0, 0.0])
 """What is left of a place (3,) m on the floor."""
 LOWEST = 0.05
@@ -147,7 +150,7 @@ def _bounds(
             most, change = limits.speed, limits.acceleration
         elif i >= 5:
             most, change = limits.turn_speed, limits.turn_acceleration
-        slowest, fastest = coasting[i] - change * dt * dt, coasting[i] + change * dt * dt
+        slowest, fastest = _next(coasting[i], change * dt * dt)
         if i < 2:
             unit = GRAVITY * dt * dt
             back, forth = -unit * ground.room[2 * i + 1] - thrown[i], unit * ground.room[2 * i] - thrown[i]
@@ -158,6 +161,14 @@ def _bounds(
         low[i], high[i] = min(low[i], max(slowest, high[i])), max(high[i], min(fastest, low[i]))
         low[i], high[i] = low[i] + planned[i] - arms_way[i], high[i] + planned[i] - arms_way[i]
     return about, low, high
+
+
+@njit(cache=True)
+def _next(coasting: float, change: float) -> tuple[float, float]:
+    """Least and most that may follow on ``coasting``: ``change`` more, or ``BRAKING`` times that less, down to rest."""
+    speed = abs(coasting)
+    least, most = min(speed - change, max(speed - BRAKING * change, 0.0)), speed + change
+    return (least, most) if coasting > 0.0 else (-most, -least)
 
 
 @njit(cache=True)

@@ -115,13 +115,18 @@ class Swing:
             self._waited += dt if self._blocked > 0.0 else 0.0
             if self._blocked < self.settings.blocked:
                 return self._descend(position, rotation, dt)
-            self._blocked, self._hovered = 0.0, 0.0
+            self._blocked, self._hovered, self.min_height = 0.0, 0.0, min(self.min_height, float(position[2]))
         return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
     def stop(self) -> None:
         """The last step was not taken: start again from rest."""
         self._velocity[:] = 0.0
         self._turning, self._refused = 0.0, True
+
+    def go_up(self) -> None:
+        """The leg of a foot that comes down pulls the body along: up again, and to a nearer place in the end."""
+        self.stop()
+        self._blocked = self.settings.blocked
 
     @property
     def lateness(self) -> float:

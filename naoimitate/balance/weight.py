@@ -51,7 +51,7 @@ class Weight:
 
     def __init__(self, law: OffsetLaw, offset: float) -> None:
         self._law, self.offset, self.speed = law, offset, 0.0
-        self._arrived, self._still, self._waited = 0.0, 0.0, 0.0
+        self._arrived, self._still, self._waited, self._onward = 0.0, 0.0, 0.0, SETTLED
         self.there = False
         """Whether the CoM is where it belongs."""
 
@@ -63,9 +63,11 @@ class Weight:
     def may_lift(self, steady: bool) -> bool:
         """Whether the weight is off the other foot, and will be while that is lifted.
 
-        steady: whether the zero moment point is where the CoM is. Right after a shift it is farther out: the better.
+        steady: whether the zero moment point is where the CoM is. Right after a shift it is farther out: the better, if
+        the shift came in one go; one that was turned back on its way has made the body swing before.
         """
-        return (self._still > LIFT_STILL and self._arrived < PROMPT) or (self.settled and steady)
+        prompt = self._arrived < PROMPT and self._onward > SETTLED
+        return (self._still > LIFT_STILL and prompt) or (self.settled and steady)
 
     def step(self, target: float, span: Span, error: float, rests: bool, pace: float, dt: float) -> tuple[float, float]:
         """The offset to reach in dt s on its way to a target, and its speed (1/s).
@@ -87,7 +89,9 @@ class Weight:
 
     def move(self, offset: float, dt: float) -> None:
         """The CoM has come to an offset within dt s."""
-        self.speed, self.offset = (offset - self.offset) / dt, offset
+        speed = (offset - self.offset) / dt
+        self._onward = self._onward + dt if speed * self.speed >= 0.0 else 0.0
+        self.speed, self.offset = speed, offset
 
     def stand(self, offset: float) -> None:
         """The feet stand elsewhere, and the CoM rests at an offset between them."""
