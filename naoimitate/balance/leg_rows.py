@@ -1,7 +1,7 @@
 """Constraints of the legs as linear rows ``C x >= b`` on a step x of the free variables.
 
-Each function writes its rows from ``row`` on and returns the next free one. The last three columns of C belong to the
-slacks that soften the bounds of load, smoothness and sway: what cannot brake in time passes them as little as it must.
+Each function writes its rows from ``row`` on and returns the next free one. The last columns of C belong to the slacks
+that soften the bounds of load, smoothness and sway: what cannot brake in time passes them as little as it must.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ TABLE_RATE = 8.0
 stops the whole body."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
-SWAY_SCALE = (1.0, 1.0, 10.0, 10.0, 10.0, 50.0, 50.0, 50.0)
-"""How the rows of sway, in m^2, m and rad, share their slack."""
+LOAD, SMOOTH, TORSO, MOMENTUM = -4, -3, -2, -1
+"""Columns of the slacks. The torso has its own: a jolt of a milliradian must not excuse centimetres of the ZMP."""
+TURN_SCALE = 5.0
+"""[m/rad] of the torso's turn: how that and its way share their slack."""
 
 
 @njit(cache=True)
@@ -104,8 +106,8 @@ def load_rows(
             for i in range(t.turn.shape[1]):
                 C[row, i] += cx * t.turn[0, i] + cy * t.turn[1, i] + cz * t.turn[2, i]
             row = _both_ways(C, b, row, -most[leg, k] - lever, most[leg, k] - lever)
-            C[row - 2, -3], C[row - 1, -3] = 1.0, 1.0
-    C[row, -3], b[row] = 1.0, 0.0
+            C[row - 2, LOAD], C[row - 1, LOAD] = 1.0, 1.0
+    C[row, LOAD], b[row] = 1.0, 0.0
     return row + 1, load
 
 
@@ -162,9 +164,12 @@ def sway_rows(legs: Legs, goal: LegGoal, t: Tangent, moved: Array, C: Array, b: 
             done += way[a, i] * moved[i]
             C[row, i] = way[a, i]
         row = _both_ways(C, b, row, goal.sway_low[a] - done, goal.sway_high[a] - done)
-        C[row - 2, -1], C[row - 1, -1] = SWAY_SCALE[a], SWAY_SCALE[a]
-    C[row, -1], b[row] = 1.0, 0.0
-    return row + 1
+        column = MOMENTUM if a < 2 else TORSO
+        scale = TURN_SCALE if a >= 5 else 1.0
+        C[row - 2, column], C[row - 1, column] = scale, scale
+    C[row, TORSO], b[row] = 1.0, 0.0
+    C[row + 1, MOMENTUM], b[row + 1] = 1.0, 0.0
+    return row + 2
 
 
 @njit(cache=True)
@@ -195,10 +200,10 @@ def joint_rows(legs: Legs, q: Array, start: Array, reach: Reach, C: Array, b: Ar
         C[row + 1, i], b[row + 1] = -1.0, q[j] - min(reach.high[j], max(legs.upper[j], start[i]))
         row += 2
         if reach.smooth_low[j] > reach.low[j] or reach.smooth_high[j] < reach.high[j]:
-            C[row, i], C[row, -2], b[row] = 1.0, 1.0, reach.smooth_low[j] - q[j]
-            C[row + 1, i], C[row + 1, -2], b[row + 1] = -1.0, 1.0, q[j] - reach.smooth_high[j]
+            C[row, i], C[row, SMOOTH], b[row] = 1.0, 1.0, reach.smooth_low[j] - q[j]
+            C[row + 1, i], C[row + 1, SMOOTH], b[row + 1] = -1.0, 1.0, q[j] - reach.smooth_high[j]
             row += 2
-    C[row, -2], b[row] = 1.0, 0.0
+    C[row, SMOOTH], b[row] = 1.0, 0.0
     return row + 1
 
 
@@ -214,7 +219,7 @@ def table_rows(legs: Legs, q: Array, dt: float, C: Array, b: Array, row: int) ->
         C[row + 1, vy], C[row + 1, vx], b[row + 1] = -1.0, high_slope, q[jy] - high + TABLE_RESERVE
         for k in range(2):
             C[row + 2 + k, vy], C[row + 2 + k, vx] = C[row + k, vy], C[row + k, vx]
-            C[row + 2 + k, -2], b[row + 2 + k] = 1.0, slow * min(b[row + k], 0.0)
+            C[row + 2 + k, SMOOTH], b[row + 2 + k] = 1.0, slow * min(b[row + k], 0.0)
         row += 4
     return row
 
@@ -243,4 +248,4 @@ def _both_ways(C: Array, b: Array, row: int, low: float, high: float) -> int:
 def count_rows(legs: Legs, stance: Stance, extra: int) -> int:
     """Rows that all these functions write at most."""
     other = 6 if stance.kind == POSE else legs.outline.shape[1]
-    return other + 4 + 2 * legs.loaded.size + 1 + 17 + 4 * legs.joints.shape[0] + 1 + 4 * legs.table_x.shape[0] + extra
+    return other + 4 + 2 * legs.loaded.size + 1 + 18 + 4 * legs.joints.shape[0] + 1 + 4 * legs.table_x.shape[0] + extra

@@ -51,8 +51,8 @@ class Solution(NamedTuple):
     load: float
 
 
-SLACKS = 3
-"""Of load, smoothness and sway."""
+SLACKS = 4
+"""Of load, smoothness, the torso and the momentum: the last columns, as in ``leg_rows``."""
 CONVERGED = 3e-4
 """[rad] of a step, below which the next one would be as small as its square."""
 CLOSED = 1e-8
@@ -181,7 +181,7 @@ def _tasks(
         away = legs.rest[legs.joints[i]] - q[legs.joints[i]]
         H[i, i] += damping * damping + weights.rest**2
         g[i] += weights.rest**2 * min(max(away, -weights.secondary_step), weights.secondary_step)
-    for k, price in enumerate((weights.overload, weights.jerk, weights.sway)):
+    for k, price in enumerate((weights.overload, weights.jerk, weights.torso, weights.momentum)):
         H[n + k, n + k], g[n + k] = 1.0, -price
 
 

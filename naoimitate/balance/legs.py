@@ -70,8 +70,10 @@ class LegWeights(NamedTuple):
     """Price of m of lever by which a joint holds more than it should."""
     jerk: float = 1.0
     """Price of rad by which a joint's step is not smooth."""
-    sway: float = 3000.0
-    """Price of m^2 of momentum beyond the bounds of sway: so high that only a body that cannot brake in time pays."""
+    torso: float = 300.0
+    """Price of m of the torso's step beyond the bounds of sway, and..."""
+    momentum: float = 3000.0
+    """...of m^2 of momentum: so high that only a body that cannot brake in time pays."""
     still: float = 0.3
     """Of the torso's own motion over the floor in a frame: it goes no faster than the feet's targets need."""
     still_reaching: float = 2.0

@@ -36,6 +36,8 @@ PLACE_STEP = 0.1
 """[rad] of each joint in one step of ``place``."""
 PLACE_TIME = 1.0
 """[s] of one step of ``place``: nothing that a frame's time bounds is in its way."""
+SLOW = 0.3
+"""[rad/s] of a joint that is at the end of its range at any time: nothing has to wait for it."""
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
@@ -91,13 +93,21 @@ class Planted:
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
                 stride.accept(plan, scale, candidate, reach.dt)
                 self._sway.accept(pose, candidate, reach.dt)
-                hurry = float((np.abs(candidate.q - pose.q) / self._speed)[self._legs.joints].max()) / reach.dt
-                self._body = Body(self._sway.calm, self._sway.steady, hurry, load)
+                hurry, end = self._pace(pose.q, candidate.q, reach.dt)
+                self._body = Body(self._sway.calm, self._sway.steady, hurry, load, end)
                 return Answer(candidate, given_up, iterations)
         stride.hold()
         self._sway.rest()
         self._body = Body()
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
+
+    def _pace(self, before: Array, q: Array, dt: float) -> tuple[float, float]:
+        """``speed`` and ``end`` of ``Body`` after a step of dt s from joint angles (J,) rad to others."""
+        legs = self._legs
+        speed = (q - before)[legs.joints] / dt
+        left = np.where(speed > 0.0, legs.upper[legs.joints] - q[legs.joints], q[legs.joints] - legs.lower[legs.joints])
+        end = np.where(np.abs(speed) > SLOW, np.maximum(left, 0.0) / np.maximum(np.abs(speed), SLOW), np.inf)
+        return float((np.abs(speed) / self._speed[legs.joints]).max()), float(end.min())
 
     def _solve(
         self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach

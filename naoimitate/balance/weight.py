@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 from naoimitate.balance.offset import OffsetLaw, Span, advance
@@ -22,6 +23,8 @@ HURRY = 0.45
 """Share of its speed that a leg's joint may use before the weight is shifted more slowly."""
 LOADED, TOO_LOADED = 1.0, 1.3
 """Shares of the bound of a joint's torque between which the weight is shifted on to it more and more slowly..."""
+STOP = 0.2
+"""[s] in which the body can stop: a joint of a leg whose range ends sooner slows the shift, too..."""
 SLOWEST = 0.2
 """...down to this share of the speed: the legs straighten meanwhile."""
 
@@ -31,19 +34,21 @@ class Body(NamedTuple):
 
     calm: it moves little enough for a foot to be lifted. steady: its zero moment point is where its CoM is. speed:
     share of its speed that the fastest joint of the legs uses. load: share of its bound that their largest torque has,
-    or will have when the weight has been shifted.
+    or will have when the weight has been shifted. end: s until the first joint of the legs, each at its speed, is at
+    the end of its range.
     """
 
     calm: bool = True
     steady: bool = True
     speed: float = 0.0
     load: float = 0.0
+    end: float = math.inf
 
     @property
     def pace(self) -> float:
         """The share of its speed at which the weight may be shifted."""
         room = (TOO_LOADED - self.load) / (TOO_LOADED - LOADED)
-        return min(1.0, HURRY / max(self.speed, HURRY)) * min(max(room, SLOWEST), 1.0)
+        return min(1.0, HURRY / max(self.speed, HURRY)) * min(max(min(room, self.end / STOP), SLOWEST), 1.0)
 
 
 class Weight:
