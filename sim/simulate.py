@@ -31,9 +31,10 @@ class SimResult:
 
     time: (T,) s. q: (T, J) rad. base_pos (T, 3) m, base_quat (T, 4): torso in the world.
     tilt: (T,) rad between the torso's up-axis and its planned direction. height_ratio: (T,) torso height over plan.
-    load: (T, 2) N on the left and right sole, mean since the frame before. swing_load: (T,) share of the weight on the
-    foot planned in the air. cop_margin: (T,) m from the centre of pressure to the edge of the planned stance soles
-    where they really are, negative outside, NaN while the soles carry nothing.
+    load: (T, 2) N on the left and right sole, mean since the frame before. fsr: (T, 2, 4) N that their force sensors
+    read, as ``RobotState.fsr``. swing_load: (T,) share of the weight on the foot planned in the air. cop_margin: (T,) m
+    from the centre of pressure to the edge of the planned stance soles where they really are, negative outside, NaN
+    while the soles carry nothing.
     hand_opening: (T, 2) left and right, 0 closed to 1 open, NaN for a robot without fingers.
     fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``falling.has_fallen``).
     """
@@ -45,6 +46,7 @@ class SimResult:
     tilt: Array
     height_ratio: Array
     load: Array
+    fsr: Array
     swing_load: Array
     cop_margin: Array
     hand_opening: Array
@@ -101,11 +103,11 @@ def simulate(
         if until_tipped and _tipped(physics, target):
             break
     count = len(samples)
-    sim_q, sim_pos, sim_quat, load, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
+    sim_q, sim_pos, sim_quat, load, fsr, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
     lean, height = tilt(base_quat[:count], sim_quat), sim_pos[:, 2] / base_pos[:count, 2]
     swing = swing_load(support[:count], load, physics.weight)
     fell = has_fallen(lean, height, swing)
-    return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
+    return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, fsr, swing, margin, opened, fell)
 
 
 def _play(
@@ -133,10 +135,12 @@ def _tipped(physics: Physics, target: Target) -> bool:
     return bool(has_tipped(tilt(target.base_quat, physics.base_quat), height))
 
 
-def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float, Array]:
-    """Joints, torso (position, orientation), foot loads, margin of the centre of pressure, hands: see ``SimResult``."""
+def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array | float, ...]:
+    """Joints, torso (position, orientation), foot loads, force sensors, margin of the centre of pressure, hands: see
+    ``SimResult``."""
     margin = _cop_margin(robot, physics, support)
-    return physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin, physics.opening
+    torso = physics.base_pos, physics.base_quat
+    return physics.q, *torso, physics.foot_load.copy(), physics.fsr, margin, physics.opening
 
 
 def _cop_margin(robot: RobotModel, physics: Physics, support: str) -> float:
