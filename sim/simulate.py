@@ -16,6 +16,7 @@ from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance, disturb_model, disturbed_settings
 from naoimitate.sim.disturbance_line import CommandLine
 from naoimitate.sim.disturbance_sensors import NoisySensors
+from naoimitate.sim.ground import Ground, set_heights, split_floor
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.settings import SimSettings
 
@@ -73,6 +74,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     disturbance: Disturbance | None = None,
     control: ServoCommand | None = None,
+    ground: Ground | None = None,
     until_tipped: bool = False,
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
@@ -83,6 +85,7 @@ def simulate(
     due at its own.
     disturbance: how the robot, its servos and its world really are, in place of the settings; the plan and the driver
     do not know it (``stiffness`` is then what the driver takes the servos for). control: stands in for compensation.
+    ground: the floor's height under each foot, level at 0 without one; neither plan nor driver know it.
     until_tipped: end with the frame in which the torso tips.
     """
     plan = [Target(*frame) for frame in zip(q, base_pos, base_quat, support.tolist(), strict=True)]
@@ -91,12 +94,12 @@ def simulate(
         disturbance, settings = Disturbance(), replace(settings, stiffness=stiffness)
     else:
         settings = disturbed_settings(settings, disturbance)
-    physics = Physics(robot, settings)
+    physics = Physics(robot, settings, None if ground is None else split_floor)
     disturb_model(physics.model, physics.data, physics.torso, disturbance)
     physics.place(*plan[0][:3], openings[0])
     control = control or servo_command(robot, stiffness if compensation else None)
     samples = []
-    for target in _play(physics, plan, time - time[0], openings, disturbance, control):
+    for target in _play(physics, plan, time - time[0], openings, disturbance, control, ground):
         samples.append(_sample(robot, physics, target.support))
         if progress is not None:
             progress(len(samples) / len(time))
@@ -117,6 +120,7 @@ def _play(
     openings: Array,
     disturbance: Disturbance,
     control: ServoCommand,
+    ground: Ground | None,
 ) -> Iterator[Target]:
     """Let time pass up to each frame of a plan in turn; moments: (T,) s from the first frame."""
     sensors = NoisySensors(physics, disturbance)
@@ -126,6 +130,8 @@ def _play(
         servos = line.through(moment, control(target, sensors.read(target.base_pos, target.base_quat)))
         now, due = physics.time, moment + SETTLE_TIME
         physics.push(disturbance.push_force(now - SETTLE_TIME, due - SETTLE_TIME, duration))
+        if ground is not None:
+            set_heights(physics.model, physics.data, ground(now - SETTLE_TIME))
         physics.advance(servos, due - now, opening)
         yield target
 
