@@ -8,13 +8,9 @@ from typing import Any
 from naoimitate.balance.offset import OffsetLaw
 from naoimitate.calib.subject import parse_subject
 from naoimitate.core.errors import StreamError
-from naoimitate.gaze import HANDS
 from naoimitate.live.session import Session, SessionSettings
 from naoimitate.robot.model import RobotModel
-from naoimitate.settings import Settings
-
-SHIFTS = ("pendulum", "parabola")
-"""What ``OffsetLaw.shift`` can be."""
+from naoimitate.settings import CHOICES, SHIFTS, Settings
 
 
 @dataclass(frozen=True)
@@ -69,7 +65,7 @@ class Setup:
 def _possible(name: str, value: Any) -> bool:
     """Whether a value of the right type can be the operator's choice."""
     if name == "head":
-        return value == "follow" or value in HANDS
+        return value in CHOICES["head"]
     if name == "shift":
         return value in SHIFTS
     return name != "speed_limit" or 0.0 < value <= 1.0
