@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 
 class State(enum.Enum):
-    """Where a session stands."""
+    """Where a session stands. ``CLUTCHED`` is also what it is in after a fall and a reset: idle until somebody asks."""
 
     IDLE = "idle"
     WAITING = "waiting"
@@ -65,6 +65,7 @@ class Action(enum.Enum):
     STAND = "blend to a stand"
     FREEZE = "no command any more"
     BEGIN = "begin from the robot's stand"
+    REST = "stay still in the robot's stand"
     LET_GO = "let go of the robot"
 
 
@@ -112,8 +113,7 @@ EDGES: tuple[Edge, ...] = (
         for state in (_S.WAITING, _S.CALIBRATING, _S.CLUTCHED, _S.HOLDING, _S.RETURNING)
     ),
     *(Edge(state, _E.FAULT, None, _A.FREEZE, _S.FAULT) for state in (_S.IDLE, *_ALIVE, _S.STOPPING)),
-    Edge(_S.FAULT, _E.RESET, False, _A.BEGIN, _S.WAITING),
-    Edge(_S.FAULT, _E.RESET, True, _A.BEGIN, _S.CLUTCHED),
+    Edge(_S.FAULT, _E.RESET, None, _A.REST, _S.CLUTCHED),
     *(Edge(state, _E.STOP, None, _A.STAND, _S.STOPPING) for state in _ALIVE),
     Edge(_S.STOPPING, _E.STANDING, None, _A.LET_GO, _S.STOPPED),
     *(Edge(state, _E.STOP, None, _A.LET_GO, _S.STOPPED) for state in (_S.IDLE, _S.STOPPING, _S.FAULT)),

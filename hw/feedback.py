@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from naoimitate.core.frames import Array
 from naoimitate.hw.learning import LearningCompensation
-from naoimitate.hw.servo_command import ServoCommand
+from naoimitate.hw.servo_command import ServoCommand, servo_command
 from naoimitate.hw.stabiliser import Stabiliser
 from naoimitate.robot.model import RobotModel
 
 
-def feedback(robot: RobotModel, stiffness: Array | float, period: float) -> ServoCommand:
+def feedback(robot: RobotModel, stiffness: Array | float | None, period: float) -> ServoCommand:
     """Gravity compensation that learns how soft the servos are, under balance from what the robot measures.
 
-    stiffness: what the servos are taken for, (J,) or one for all, N m/rad. period: s between two calls.
+    stiffness: what the servos are taken for, (J,) or one for all, N m/rad; None: nobody knows, balance alone. period:
+    s between two calls.
     """
+    if stiffness is None:
+        return Stabiliser(robot, servo_command(robot, None), period)
     return Stabiliser(robot, LearningCompensation(robot, stiffness, period), period)

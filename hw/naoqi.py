@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,10 +22,10 @@ from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import RobotCommand
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
-from naoimitate.hw.learning import LearningCompensation
 from naoimitate.hw.naoqi_link import NaoqiLink
 from naoimitate.hw.naoqi_sender import NaoqiSender
-from naoimitate.hw.naoqi_senses import accelerometer_sign, blank, keys, state
+from naoimitate.hw.naoqi_senses import accelerometer_sign, as_known, blank, keys, state
+from naoimitate.hw.naoqi_settings import NaoqiSettings, loops_of
 from naoimitate.hw.naoqi_start import (
     ON_ITS_FEET,
     check_body,
@@ -38,7 +38,7 @@ from naoimitate.hw.naoqi_start import (
     stand_up,
     wake,
 )
-from naoimitate.hw.servo_command import ServoCommand, Target, servo_command, target_of
+from naoimitate.hw.servo_command import Target, target_of
 from naoimitate.robot.model import RobotModel
 
 SILENCE = 0.5
@@ -47,32 +47,8 @@ SILENCE = 0.5
 GONE = 2.0
 """[s] without an answer after which it does not obey either; it then holds the last command that it got."""
 
-
-@dataclass(frozen=True)
-class NaoqiSettings:
-    """How to reach a NAO, and how to move it."""
-
-    url: str = "tcp://nao.local:9559"
-    """Address; robots with NAOqi 2.9 ask for tcps://HOST:9503, user and password."""
-    user: str = ""
-    password: str = ""
-    patience: float = 5.0
-    """[s] to wait for an answer before the start."""
-    period: float = 0.02
-    """[s] of ALMotion."""
-    stiffness: float = 1.0
-    """Share of the servos' stiffness while the robot imitates."""
-    ramp: float = 1.5
-    """[s] from no stiffness to the full one."""
-    stand_speed: float = 0.5
-    """Share of the speed with which it stands up."""
-    approach: float = 0.3
-    """[rad/s] Highest speed of the farthest joint on the way from NAOqi's stand to the model's posture ``stand``."""
-    servo_stiffness: float | None = None
-    """[N m/rad] of the servos, for gravity compensation; None = none, since nobody publishes it: measure it first."""
-    learning: bool = False
-    """Whether ``servo_stiffness`` is a guess that encoders and feet correct, see ``hw.learning``: tried in simulation
-    only."""
+NEW = 3.0
+"""Periods for which closed loops believe a state: answers take one or two. From an older one they let go."""
 
 
 class NaoqiDriver:
@@ -89,7 +65,6 @@ class NaoqiDriver:
         self._robot, self._settings = robot, settings or NaoqiSettings()
         self._zeros, self._notice = zeros or no_zeros(robot), notice
         self._names, self._keys = list(robot.joint_names), keys(robot.joint_names)
-        self._command = _servo_command(robot, self._settings)
         self._link: NaoqiLink | None = None
         self._thread: threading.Thread | None = None
         self._leaving: NaoqiLink | None = None
@@ -111,7 +86,7 @@ class NaoqiDriver:
         """
         self.stop()
         s, halt = self._settings, threading.Event()
-        self._halt = halt
+        self._halt, self._command = halt, loops_of(self._robot, s)
         link = NaoqiLink(s.url, s.user, s.password, s.patience)
         try:
             check_version(link)
@@ -242,7 +217,7 @@ class NaoqiDriver:
         while not halt.is_set() and link.open:
             try:
                 if self._target is not None:
-                    self._sender.send(self._target, self._state)
+                    self._sender.send(self._target, as_known(self._state, self._now(), NEW * self.period))
                 if asked is not None and all(future.done() for future in asked):
                     answers, asked = asked, None
                     self._take(*answers)
@@ -267,15 +242,3 @@ class NaoqiDriver:
 
     def _now(self) -> float:
         return time.monotonic() - self._began
-
-
-def _servo_command(robot: RobotModel, settings: NaoqiSettings) -> ServoCommand:
-    """What is added for gravity."""
-    if settings.servo_stiffness is None:
-        return servo_command(robot, None)
-    stiffness = settings.servo_stiffness * settings.stiffness
-    return (
-        LearningCompensation(robot, stiffness, settings.period)
-        if settings.learning
-        else servo_command(robot, stiffness)
-    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -75,6 +76,12 @@ def state(
         alarms=tuple(alarms),
         faults=tuple(faults),
     )
+
+
+def as_known(newest: RobotState, now: float, oldest: float) -> RobotState:
+    """The newest state as one of ``now``, as long as it is not older than ``oldest`` s: between two answers the robot
+    is still where it was felt. An older one stays as old as it is, so that loops let go of what they do from it."""
+    return replace(newest, time=now) if now - newest.time <= oldest else newest
 
 
 def blank(joints: int, q: Array) -> RobotState:

@@ -155,6 +155,20 @@ class Imitator:
         self._last_time = frame.time
         return self._command(seen, footing, given_up, iterations)
 
+    def hold(self, frame: HumanFrame, dt: float) -> RobotCommand:
+        """Stay where it is for dt s, whatever the person does: for a robot that is at rest, after ``stand`` or steps.
+
+        Raises CalibrationError where there is no pose yet.
+        """
+        if self._subject is None or self._pose is None:
+            raise CalibrationError("use(subject), then stand() or a step, before there is a pose to hold")
+        seen = self._observer.see(frame, None)
+        footing = self._footing(seen, self._within_reach(self.mapping.targets(seen.body.posture)), "", may_lift=False)
+        self._time += min(self.settings.limits.max_dt, max(self.settings.limits.min_dt, dt))
+        self._last_time = frame.time
+        self._stand_still()
+        return self._command(seen, footing, GivenUp.HOLD, 0)
+
     def _blended(self, blend: Blend, targets: Array, footing: Footing) -> tuple[Array, Footing]:
         """What is asked for while the robot blends in: no foot is lifted before it is over."""
         if blend.done:

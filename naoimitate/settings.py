@@ -9,14 +9,29 @@ from naoimitate.balance.legs import LegLimits, LegWeights
 from naoimitate.balance.offset import OffsetLaw
 from naoimitate.balance.paper import PaperIk
 from naoimitate.balance.swing import SwingSettings
+from naoimitate.core.errors import SettingsError
 from naoimitate.gate import GateLimits
+from naoimitate.gaze import HANDS
 from naoimitate.limb import LimbWeights
 from naoimitate.limits import TaskLimits
+
+SHIFTS = ("pendulum", "parabola")
+"""What ``OffsetLaw.shift`` can be."""
+CHOICES = {
+    "retarget": ("planted", "paper", "direct"),
+    "reference": ("virtual", "reachable"),
+    "hand_orientation": ("free", "upright", "follow"),
+    "head": ("follow", *HANDS),
+}
+"""What the choices of ``Settings`` can be."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Choices and parameters of the method; the defaults are ours, ``PAPER`` is the published set."""
+    """Choices and parameters of the method; the defaults are ours, ``PAPER`` is the published set.
+
+    Raises SettingsError for a choice that does not exist.
+    """
 
     retarget: str = "planted"
     """``planted``: soles fixed in the world. ``paper``: one foot is shifted. ``direct``: no stabilisation (falls)."""
@@ -38,6 +53,13 @@ class Settings:
     arm_weights: LimbWeights = field(default_factory=LimbWeights)
     clearance: ClearanceSettings = field(default_factory=ClearanceSettings)
     gate: GateLimits = field(default_factory=GateLimits)
+
+    def __post_init__(self) -> None:
+        """Look at the choices."""
+        made = [(name, getattr(self, name), choices) for name, choices in CHOICES.items()]
+        for name, choice, choices in (*made, ("offset.shift", self.offset.shift, SHIFTS)):
+            if choice not in choices:
+                raise SettingsError(f"settings: {name} is {choice!r}, choose one of {', '.join(choices)}")
 
 
 PAPER = Settings(retarget="paper", reference="reachable", paper_ik=PaperIk(), offset=OffsetLaw(shift="parabola"))

@@ -60,7 +60,7 @@ def _geometry(shape: Shape) -> dict[str, Any]:
 def add_soles(bodies: dict[int, Any], robot: RobotModel, friction: float) -> None:
     """Add the balls on which each sole stands, on a massless body ``l_plate``, ``r_plate`` in the sole frame.
 
-    A body of its own, because touch sensors count all contacts of their body: a foot that the other one presses
+    A body of its own, because force sensors measure all that its body bears: a foot that the other one presses
     sideways does not stand.
     """
     for side in SIDES:

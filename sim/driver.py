@@ -46,13 +46,7 @@ class MujocoDriver:
     ) -> None:
         self._settings = settings
         self._physics = Physics(robot, settings, scene)
-        self._servos: ServoCommand
-        if compensation and learning and balance:
-            self._servos = feedback(robot, settings.stiffness, settings.period)
-        elif compensation and learning:
-            self._servos = LearningCompensation(robot, settings.stiffness, settings.period)
-        else:
-            self._servos = servo_command(robot, settings.stiffness if compensation else None)
+        self._robot, self._loops = robot, (compensation, learning, balance)
         self._real_time = real_time
         stand = robot.postures["stand"]
         self._stand = self._target = Target(stand, *stand_on_floor(robot, stand), "D")
@@ -128,8 +122,17 @@ class MujocoDriver:
             self._tick()
         return self._state
 
+    def _closed(self) -> ServoCommand:
+        """What is added to a target, new for each connection: loops remember the robot's clock and its servos."""
+        (compensation, learning, balance), stiffness = self._loops, self._settings.stiffness
+        if compensation and learning and balance:
+            return feedback(self._robot, stiffness, self.period)
+        if compensation and learning:
+            return LearningCompensation(self._robot, stiffness, self.period)
+        return servo_command(self._robot, stiffness if compensation else None)
+
     def _place(self) -> None:
-        target, self._held = self._stand, False
+        target, self._held, self._servos = self._stand, False, self._closed()
         self._target = target
         self._physics.soften(1.0)
         self._physics.place(target.q, target.base_pos, target.base_quat)

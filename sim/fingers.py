@@ -20,8 +20,8 @@ from naoimitate.core.frames import SIDES, Array
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.contacts import CONTACT_SOLREF, FLOOR, HIDDEN_GROUP, OBJECTS, SHAPE_GROUP
 from naoimitate.sim.coupling import couple_joints
+from naoimitate.sim.force_sensors import SENSOR_GROUP
 from naoimitate.sim.scene import SIDE_COLOUR
-from naoimitate.sim.sensors import SENSOR_GROUP
 
 DIGIT_MASS, DIGIT_INERTIA = 1e-10, 1e-14
 """kg and kg m^2, of one finger: MuJoCo wants some; six of them are far below the last digit of a robot's mass."""

@@ -2,8 +2,8 @@
 
 Names: bodies and joints as in the URDF, actuators as the joints that they move, ``base`` the free joint, ``floor``,
 geoms of body shapes as in ``RobotModel.shapes``, ``l_plate``, ``r_plate`` bodies in the sole frames, ``l_sole_0``...
-the contact points of a sole, sensors ``accelerometer``, ``gyro`` and ``l_fsr_front_left``... after
-``hw.driver.FSR_NAMES``; those of the fingers see ``sim.fingers``.
+the contact points of a sole, sensors ``accelerometer``, ``gyro``, ``l_sole_force``, ``l_sole_torque``...; those of the
+fingers see ``sim.fingers``.
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from naoimitate.robot.model import BASE, RobotModel
 from naoimitate.sim.contacts import add_shapes, add_soles
 from naoimitate.sim.coupling import STOP_SOLREF, couple_joints
 from naoimitate.sim.fingers import add_fingers
+from naoimitate.sim.force_sensors import add_force_sensors
 from naoimitate.sim.scene import add_looks, add_scene
-from naoimitate.sim.sensors import add_cameras, add_force_sensors, add_imu
+from naoimitate.sim.sensors import add_cameras, add_imu
 from naoimitate.sim.settings import SimSettings
 
 DEFAULT = SimSettings()
@@ -55,7 +56,7 @@ def build_spec(robot: RobotModel, settings: SimSettings = DEFAULT) -> mujoco.MjS
     add_shapes(spec, bodies, robot, settings.friction)
     add_soles(bodies, robot, settings.friction)
     add_imu(spec, bodies, robot)
-    add_force_sensors(spec, robot)
+    add_force_sensors(spec)
     add_cameras(spec, robot)
     add_looks(spec, bodies, robot)
     add_scene(spec, bodies[BASE], settings.friction)

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from naoimitate.core.frames import SIDES, Array
-from naoimitate.hw.driver import FSR_NAMES
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.contacts import plate_name
+from naoimitate.sim.force_sensors import ForceSensors
 from naoimitate.sim.hands import CLOSED, Hands
 from naoimitate.sim.model import Scene, build_model
 from naoimitate.sim.settings import SimSettings
@@ -34,7 +34,7 @@ class Physics:
         self._servos = np.array([self.model.actuator(robot.joint_names[index]).id for index in self._driven])
         self._hands = Hands(self.model, robot)
         self._all_servos = np.concatenate([self._servos, self._hands.servos])
-        self._fsr = np.array([[self._sensor(f"{side}_fsr_{name}") for name in FSR_NAMES] for side in SIDES])
+        self._force_sensors = ForceSensors(self.model, robot)
         self._accelerometer, self._gyro = self._sensor("accelerometer"), self._sensor("gyro")
         self.torso = int(self.model.jnt_bodyid[self.model.joint("base").id])
         """Index of the torso's body."""
@@ -87,7 +87,7 @@ class Physics:
         for step in range(1, steps + 1):
             self.data.ctrl[self._all_servos] = start + (end - start) * (step / steps)
             mujoco.mj_step(self.model, self.data)
-            self.foot_load += self.fsr.sum(axis=1) / steps
+            self.foot_load += self._force_sensors.loads(self.data) / steps
 
     @property
     def time(self) -> float:
@@ -124,7 +124,7 @@ class Physics:
     @property
     def fsr(self) -> Array:
         """Foot forces (2, 4) N, as ``RobotState.fsr``."""
-        return np.array(self.data.sensordata[self._fsr])
+        return self._force_sensors.read(self.data)
 
     @property
     def accelerometer(self) -> Array:

@@ -1,4 +1,4 @@
-"""The simulated robot's senses, from the ``imu``, ``fsr`` and ``cameras`` of its data: IMU, foot forces, cameras."""
+"""The simulated robot's inertial board and cameras, from the ``imu`` and ``cameras`` of its data."""
 
 from __future__ import annotations
 
@@ -8,21 +8,11 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from naoimitate.core.frames import SIDES, Array
-from naoimitate.hw.driver import FSR_NAMES
+from naoimitate.core.frames import Array
 from naoimitate.robot.model import BASE, RobotModel
-from naoimitate.sim.contacts import plate_name
-
-SENSOR_GROUP = 4
-"""MuJoCo's site group of sensors: not drawn."""
-
-FSR_KEYS = ("FrontLeft", "FrontRight", "RearLeft", "RearRight")
-"""Names in the robot's data, in the order of ``FSR_NAMES``."""
+from naoimitate.sim.force_sensors import SENSOR_GROUP
 
 Z_AXIS = np.array([0.0, 0.0, 1.0])
-
-FSR_REACH = 0.3
-"""How far a force sensor's quarter of the sole reaches out from the split, m: beyond any foot."""
 
 
 def add_imu(spec: mujoco.MjSpec, bodies: dict[int, Any], robot: RobotModel) -> None:
@@ -35,34 +25,6 @@ def add_imu(spec: mujoco.MjSpec, bodies: dict[int, Any], robot: RobotModel) -> N
     for name, key, kind in sensors:
         bodies[BASE].add_site(name=name, pos=imu.get(key, [0.0, 0.0, 0.0]), group=SENSOR_GROUP)
         spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=name)
-
-
-def add_force_sensors(spec: mujoco.MjSpec, robot: RobotModel) -> None:
-    """Add four touch sensors a foot. Each sums the normal forces (N) on its quarter of the sole; the quarters meet
-    in the middle between the robot's sensors (of the outline, where its data give none) and leave nothing out."""
-    for side in SIDES:
-        plate = spec.body(plate_name(side))
-        middle = _split(robot, side)
-        for name, (forward, left) in zip(FSR_NAMES, ((1, 1), (1, -1), (-1, 1), (-1, -1)), strict=True):
-            site = f"{side}_fsr_{name}"
-            centre = middle + FSR_REACH * np.array([forward, left])
-            plate.add_site(
-                name=site,
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=[*centre, 0.0],
-                size=[FSR_REACH, FSR_REACH, 0.01],
-                group=SENSOR_GROUP,
-            )
-            touch = mujoco.mjtSensor.mjSENS_TOUCH
-            spec.add_sensor(name=site, type=touch, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=site)
-
-
-def _split(robot: RobotModel, side: str) -> Array:
-    """Where the four quarters of a sole meet, (2,) m in the sole frame."""
-    sensors = robot.data.get("fsr", {}).get(side)
-    if sensors is None:
-        return np.asarray(0.5 * (robot.soles[side].min(axis=0) + robot.soles[side].max(axis=0)))
-    return np.asarray(np.mean([sensors[key] for key in FSR_KEYS], axis=0))
 
 
 def add_cameras(spec: mujoco.MjSpec, robot: RobotModel) -> None:

@@ -16,6 +16,7 @@ from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance, disturb_model, disturbed_settings
 from naoimitate.sim.disturbance_line import CommandLine
 from naoimitate.sim.disturbance_sensors import NoisySensors
+from naoimitate.sim.ground import Ground, set_heights, split_floor
 from naoimitate.sim.physics import Physics
 from naoimitate.sim.settings import SimSettings
 
@@ -31,9 +32,10 @@ class SimResult:
 
     time: (T,) s. q: (T, J) rad. base_pos (T, 3) m, base_quat (T, 4): torso in the world.
     tilt: (T,) rad between the torso's up-axis and its planned direction. height_ratio: (T,) torso height over plan.
-    load: (T, 2) N on the left and right sole, mean since the frame before. swing_load: (T,) share of the weight on the
-    foot planned in the air. cop_margin: (T,) m from the centre of pressure to the edge of the planned stance soles
-    where they really are, negative outside, NaN while the soles carry nothing.
+    load: (T, 2) N on the left and right sole, mean since the frame before. fsr: (T, 2, 4) N that their force sensors
+    read, as ``RobotState.fsr``. swing_load: (T,) share of the weight on the foot planned in the air. cop_margin: (T,) m
+    from the centre of pressure to the edge of the planned stance soles where they really are, negative outside, NaN
+    while the soles carry nothing.
     hand_opening: (T, 2) left and right, 0 closed to 1 open, NaN for a robot without fingers.
     fell: (T,) bool, the measure ``survival``: True from the first failure on (see ``falling.has_fallen``).
     """
@@ -45,6 +47,7 @@ class SimResult:
     tilt: Array
     height_ratio: Array
     load: Array
+    fsr: Array
     swing_load: Array
     cop_margin: Array
     hand_opening: Array
@@ -71,6 +74,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     disturbance: Disturbance | None = None,
     control: ServoCommand | None = None,
+    ground: Ground | None = None,
     until_tipped: bool = False,
 ) -> SimResult:
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
@@ -81,6 +85,7 @@ def simulate(
     due at its own.
     disturbance: how the robot, its servos and its world really are, in place of the settings; the plan and the driver
     do not know it (``stiffness`` is then what the driver takes the servos for). control: stands in for compensation.
+    ground: the floor's height under each foot, level at 0 without one; neither plan nor driver know it.
     until_tipped: end with the frame in which the torso tips.
     """
     plan = [Target(*frame) for frame in zip(q, base_pos, base_quat, support.tolist(), strict=True)]
@@ -89,23 +94,23 @@ def simulate(
         disturbance, settings = Disturbance(), replace(settings, stiffness=stiffness)
     else:
         settings = disturbed_settings(settings, disturbance)
-    physics = Physics(robot, settings)
+    physics = Physics(robot, settings, None if ground is None else split_floor)
     disturb_model(physics.model, physics.data, physics.torso, disturbance)
     physics.place(*plan[0][:3], openings[0])
     control = control or servo_command(robot, stiffness if compensation else None)
     samples = []
-    for target in _play(physics, plan, time - time[0], openings, disturbance, control):
+    for target in _play(physics, plan, time - time[0], openings, disturbance, control, ground):
         samples.append(_sample(robot, physics, target.support))
         if progress is not None:
             progress(len(samples) / len(time))
         if until_tipped and _tipped(physics, target):
             break
     count = len(samples)
-    sim_q, sim_pos, sim_quat, load, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
+    sim_q, sim_pos, sim_quat, load, fsr, margin, opened = (np.array(column) for column in zip(*samples, strict=True))
     lean, height = tilt(base_quat[:count], sim_quat), sim_pos[:, 2] / base_pos[:count, 2]
     swing = swing_load(support[:count], load, physics.weight)
     fell = has_fallen(lean, height, swing)
-    return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, swing, margin, opened, fell)
+    return SimResult(time[:count], sim_q, sim_pos, sim_quat, lean, height, load, fsr, swing, margin, opened, fell)
 
 
 def _play(
@@ -115,6 +120,7 @@ def _play(
     openings: Array,
     disturbance: Disturbance,
     control: ServoCommand,
+    ground: Ground | None,
 ) -> Iterator[Target]:
     """Let time pass up to each frame of a plan in turn; moments: (T,) s from the first frame."""
     sensors = NoisySensors(physics, disturbance)
@@ -124,6 +130,8 @@ def _play(
         servos = line.through(moment, control(target, sensors.read(target.base_pos, target.base_quat)))
         now, due = physics.time, moment + SETTLE_TIME
         physics.push(disturbance.push_force(now - SETTLE_TIME, due - SETTLE_TIME, duration))
+        if ground is not None:
+            set_heights(physics.model, physics.data, ground(now - SETTLE_TIME))
         physics.advance(servos, due - now, opening)
         yield target
 
@@ -133,10 +141,12 @@ def _tipped(physics: Physics, target: Target) -> bool:
     return bool(has_tipped(tilt(target.base_quat, physics.base_quat), height))
 
 
-def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array, Array, Array, Array, float, Array]:
-    """Joints, torso (position, orientation), foot loads, margin of the centre of pressure, hands: see ``SimResult``."""
+def _sample(robot: RobotModel, physics: Physics, support: str) -> tuple[Array | float, ...]:
+    """Joints, torso (position, orientation), foot loads, force sensors, margin of the centre of pressure, hands: see
+    ``SimResult``."""
     margin = _cop_margin(robot, physics, support)
-    return physics.q, physics.base_pos, physics.base_quat, physics.foot_load.copy(), margin, physics.opening
+    torso = physics.base_pos, physics.base_quat
+    return physics.q, *torso, physics.foot_load.copy(), physics.fsr, margin, physics.opening
 
 
 def _cop_margin(robot: RobotModel, physics: Physics, support: str) -> float:

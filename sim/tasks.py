@@ -84,7 +84,7 @@ class Moved(NamedTuple):
     q: Array
     base_pos: Array
     base_quat: Array
-    load: Array
+    fsr: Array
     hand_opening: Array
     ball: Array
     positions: Array
@@ -95,8 +95,8 @@ class Attempt:
     """A task as it went, T frames.
 
     commands: what the robot was told. step_time: (T,) s that each took to compute. mapping: of the operator to the
-    robot. moved: as it really went, q (T, J) rad, base_pos (T, 3) m, base_quat (T, 4), load (T, 2) N on the left and
-    right sole, hand_opening (T, 2), ball (T, 3) m, positions (T, n) of the whole world: ``qpos`` of ``model``.
+    robot. moved: as it really went, q (T, J) rad, base_pos (T, 3) m, base_quat (T, 4), fsr (T, 2, 4) N under the left
+    and right sole, hand_opening (T, 2), ball (T, 3) m, positions (T, n) of the whole world: ``qpos`` of ``model``.
     swing_load: (T,) share of the weight on a foot planned in the air. fell: (T,) bool, the measure ``survival``: True
     from the first frame on in which the torso has tipped or a swing foot carries a tenth (``core.falling``).
     """
@@ -177,14 +177,13 @@ def _advance(driver: MujocoDriver) -> Moved:
     """Let a period pass."""
     state, opening, positions = driver.advance(driver.period), driver.hand_opening, driver.snapshot[1]
     ball = int(driver.model.joint(BALL).qposadr[0])
-    assert state.base_pos is not None and state.base_quat is not None and state.fsr is not None
-    load = state.fsr.sum(axis=1)
-    return Moved(state.q, state.base_pos, state.base_quat, load, opening, positions[ball : ball + 3], positions)
+    assert state.base_pos is not None and state.base_quat is not None
+    return Moved(state.q, state.base_pos, state.base_quat, state.fsr, opening, positions[ball : ball + 3], positions)
 
 
 def _survival(commands: list[RobotCommand], moved: Moved, weight: float) -> tuple[Array, npt.NDArray[np.bool_]]:
     """Load (T,) of the swing foot as a share of the weight (N), and ``fell`` (T,)."""
     lean = tilt(np.array([command.base_quat for command in commands]), moved.base_quat)
     height = moved.base_pos[:, 2] / np.array([command.base_pos[2] for command in commands])
-    swing = swing_load(np.array([command.support for command in commands]), moved.load, weight)
+    swing = swing_load(np.array([command.support for command in commands]), moved.fsr.sum(axis=2), weight)
     return swing, has_fallen(lean, height, swing)

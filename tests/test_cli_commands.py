@@ -46,7 +46,12 @@ def test_a_simulated_run_says_whether_it_fell(here: Path, capsys: pytest.Capture
     made = load_run("run.npz")
     assert made.sim_q is not None
     assert made.sim_q.shape == made.q.shape
+    assert made.sim_fsr is not None and made.sim_fsr.shape == (len(made), 2, 4)
     assert "in simulation" in capsys.readouterr().out
+    assert run(["score", "run.npz", "--json"]) == 0
+    values = json.loads(capsys.readouterr().out)
+    assert values["sim_cop_margin_min_mm"] == pytest.approx(values["sim_zmp_margin_min_mm"], abs=2.0)
+    assert values["sim_cop_edge_frames"] == 0
 
 
 def test_score_check_fails_on_a_missed_bar_only(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -55,6 +55,9 @@ MISTAKES = [
     ["check", "absent.bvh"],
     ["check", "nao", "--robot-version", "v9"],
     ["check", "."],
+    ["live", "--source", "replay:builtin:wave", "--driver", "can", "--feedback"],
+    ["live", "--source", "replay:builtin:wave", "--driver", "none", "--feedback"],
+    ["live", "--source", "replay:builtin:wave", "--driver", "none", "--shift", "jump"],
     ["reproduce", "other2020"],
     ["demo", "--out", "text.npz/inside"],
 ]

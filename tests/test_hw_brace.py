@@ -203,8 +203,7 @@ def test_a_pushed_robot_braces_once_falls_and_lives_again_after_a_reset(side: st
 
 
 @pytest.mark.parametrize("measured", [False, True])
-def test_a_session_whose_robot_fell_waits_again_after_a_reset(measured: bool) -> None:
-    """Paused, where it knows its operator already."""
+def test_a_session_whose_robot_fell_is_idle_after_a_reset(measured: bool) -> None:
     session = Session(NAO)
     session.start()
     session._fsm.measured = measured
@@ -214,10 +213,10 @@ def test_a_session_whose_robot_fell_waits_again_after_a_reset(measured: bool) ->
     assert session.state is State.FAULT
     assert session.reason == "falling"
     session.tell(Event.RESET)
-    tick = session.step(2 * DT)
-    assert session.state is (State.CLUTCHED if measured else State.WAITING)
-    assert session.reason == ""
-    np.testing.assert_allclose(tick.command.q, STAND, atol=0.05)
+    ticks = [session.step((2 + i) * DT) for i in range(100)]
+    assert session.state is State.CLUTCHED and session.reason == ""
+    np.testing.assert_array_equal([tick.command.q for tick in ticks], np.tile(STAND, (100, 1)))
+    np.testing.assert_allclose(np.diff([tick.command.time for tick in ticks]), DT, atol=1e-9)
 
 
 @pytest.mark.parametrize("response", ["limp", "brace"])

@@ -25,8 +25,10 @@ from naoimitate.core.errors import DriverError
 from naoimitate.core.frames import RobotCommand
 from naoimitate.hw.driver import Driver
 from naoimitate.hw.guarded import Condition, GuardedDriver
-from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings
+from naoimitate.hw.naoqi import NaoqiDriver
 from naoimitate.hw.naoqi_sender import HEADROOM
+from naoimitate.hw.naoqi_senses import as_known, blank
+from naoimitate.hw.naoqi_settings import NaoqiSettings
 from naoimitate.robot.model import Array, RobotModel
 from naoimitate.sim.placement import stand_on_floor
 
@@ -197,6 +199,32 @@ def test_a_guessed_stiffness_can_be_corrected_by_what_the_robot_feels(
     driver = connect(servo_stiffness=200.0, learning=True)
     driver.write(command(STAND))
     wait_for(lambda: driver._command.factor < 0.8)  # type: ignore[attr-defined]
+
+
+def test_closed_loops_balance_what_it_feels_and_let_go_when_it_feels_nothing_new(
+    connect: Callable[..., NaoqiDriver], fake: RemoteNao
+) -> None:
+    """It leans 2 deg too far forwards: the body is brought back over the feet, until the robot does not answer."""
+    fake.feels("InertialSensor/AngleY", math.radians(2.0))
+    driver = connect(balance=True)
+    driver.write(command(STAND))
+    legs = [j for side in "lr" for j in NAO.chains[f"{side}_leg"]]
+
+    def moved() -> float:
+        """By how much (rad) what is sent is beside the command, at most."""
+        sent = fake.sent
+        return max(abs(sent[-1][1][NAO.joint_names[j]] - STAND[j]) for j in legs) if sent else 0.0
+
+    wait_for(lambda: moved() > math.radians(1.5))
+    fake.order("event", "answering", False)
+    wait_for(lambda: moved() < math.radians(0.1))
+    fake.order("event", "answering", True)
+    wait_for(lambda: moved() > math.radians(1.5))
+
+
+def test_between_two_answers_a_state_is_still_known_and_later_it_is_not() -> None:
+    state = blank(len(STAND), STAND)
+    assert [as_known(state, now, 0.06).time for now in (0.0, 0.03, 0.06, 0.07, 5.0)] == [0.0, 0.03, 0.06, 0.0, 0.0]
 
 
 def test_it_feels_what_the_robot_measures_in_our_units(connect: Callable[..., NaoqiDriver], fake: RemoteNao) -> None:

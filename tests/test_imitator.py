@@ -10,7 +10,7 @@ from people import person, tpose, turned
 from naoimitate.core.errors import CalibrationError
 from naoimitate.core.frames import GivenUp
 from naoimitate.imitator import Imitator
-from naoimitate.motion.builtin import HANGING
+from naoimitate.motion.builtin import HANGING, builtin_motion
 from naoimitate.robot.model import RobotModel
 from naoimitate.settings import PAPER, Settings
 
@@ -152,3 +152,19 @@ def test_the_upper_body_alone_is_imitated_by_a_robot_that_stands(robot: RobotMod
     q = np.array([c.q for c in commands])
     legs, arms = (robot.chains[f"l_{part}"] for part in ("leg", "arm"))
     assert np.ptp(q[50:, list(legs)], axis=0).max() < 0.1 * np.ptp(q[:, list(arms)], axis=0).max()
+
+
+def test_a_robot_that_holds_stays_in_its_pose_and_goes_on_from_there(robot: RobotModel) -> None:
+    motion = builtin_motion("march")
+    imitator = Imitator(robot)
+    with pytest.raises(CalibrationError, match="use"):
+        imitator.hold(motion.at(0.0), 0.01)
+    imitator.calibrate(motion.tpose)
+    before = [imitator.step(motion.at(0.01 * k), 0.01) for k in range(150)][-1]
+    held = [imitator.hold(motion.at(1.5 + 0.01 * k), 0.01) for k in range(100)]
+    for command in held:
+        np.testing.assert_array_equal(command.q, before.q)
+        assert command.given_up is GivenUp.HOLD and command.support == before.support
+    np.testing.assert_allclose(np.diff([before.time, *(c.time for c in held)]), 0.01, atol=1e-9)
+    after = imitator.step(motion.at(2.5), 0.01)
+    assert (np.abs(after.q - before.q) <= 0.9 * robot.speed * 0.01).all()

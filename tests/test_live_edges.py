@@ -42,7 +42,8 @@ TOURS: dict[str, list[Step]] = {
         *BEGIN, ("stand", E.FRAME), ("key u", E.BODY), ("silence", E.LATE), ("stand", E.FRAME),
     ],
     "an emergency while waiting for the T-pose": [
-        *BEGIN, ("stand", E.FRAME), ("emergency", E.FAULT), ("key r", E.RESET), ("stand", E.FRAME),
+        *BEGIN, ("stand", E.FRAME), ("emergency", E.FAULT), ("key r", E.RESET), ("key c", E.CLUTCH),
+        ("stand", E.FRAME),
     ],
     "pauses": [
         *MEASURED, ("", E.BLENDED), ("key c", E.CLUTCH), ("key u", E.BODY), ("key c", E.CLUTCH), ("", E.FRAME),

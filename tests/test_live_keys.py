@@ -77,7 +77,7 @@ def test_a_fault_is_reset(session: Session, driver: GuardedDriver) -> None:
     driver.emergency_stop()
     session.tell(Event.FAULT, "emergency stop")
     assert not obey("r", session, driver)
-    assert session.state is State.WAITING and driver.status.condition is Condition.LIVE
+    assert session.state is State.CLUTCHED and driver.status.condition is Condition.LIVE
 
 
 def test_a_robot_that_cannot_be_connected_stays_in_fault_and_says_why(

@@ -146,7 +146,8 @@ def journal(nao: RobotModel, out: Path, frames: int, simulated: bool = False) ->
     written = Journal(out, fixed)
     for k in range(frames):
         tick = session.step(0.01 * k)
-        moved = Moved(tick.command.q, tick.command.base_pos, tick.command.base_quat, k == 7) if simulated else None
+        c, forces = tick.command, np.full((2, 4), 6.0)
+        moved = Moved(c.q, c.base_pos, c.base_quat, forces, k == 7) if simulated else None
         written.add(Row(tick.command, tick.arrival, tick.state.value, np.nan, 1e-3, moved))
     return written
 
@@ -163,6 +164,7 @@ def test_a_journal_keeps_how_the_simulated_robot_moved(nao: RobotModel, tmp_path
     run = journal(nao, tmp_path / "run.npz", 130, simulated=True).close()
     assert run is not None and run.sim_fell is True
     assert np.array_equal(run.sim_q, run.q)
+    assert run.sim_fsr is not None and run.sim_fsr.shape == (130, 2, 4)
 
 
 def test_a_killed_session_loses_half_a_second_at_most(nao: RobotModel, tmp_path: Path) -> None:

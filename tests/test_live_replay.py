@@ -68,11 +68,12 @@ def recorded(robot: RobotModel, path: Path, setup: Setup) -> list[Turn]:
 
 
 def test_a_recording_plays_again_bit_for_bit_with_all_that_was_said(nao: RobotModel, tmp_path: Path) -> None:
-    setup = Setup(speed_limit=0.7, mirror=True)
+    setup = Setup(speed_limit=0.7, mirror=True, shift="parabola")
     before = recorded(nao, tmp_path / "a.rec", setup)
     again = read_recording(tmp_path / "a.rec")
     session = Setup.of(again.header["setup"]).session(nao)
     after = list(play(again, session, Stream(JSON, ())))
+    assert session.imitator.settings.offset.shift == "parabola"
     assert [t.tick.state for t in after] == [t.tick.state for t in before]
     assert np.array_equal([t.tick.command.q for t in after], [t.tick.command.q for t in before])
     states = {t.tick.state.value for t in after}
@@ -114,7 +115,9 @@ def test_a_recording_is_played_as_it_was_set_up_unless_the_operator_says_otherwi
     assert "already" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("header", [None, 3, {"speed_limit": "fast"}, {"speed_limit": 7.0}, {"mirror": 1}])
+@pytest.mark.parametrize(
+    "header", [None, 3, {"speed_limit": "fast"}, {"speed_limit": 7.0}, {"mirror": 1}, {"shift": "jump"}]
+)
 def test_a_setup_that_cannot_be_is_refused(header: object) -> None:
     with pytest.raises(StreamError, match="record it anew"):
         Setup.of(header)

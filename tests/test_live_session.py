@@ -200,6 +200,23 @@ def test_a_fault_ends_the_session_until_the_robot_stands_again(nao: RobotModel) 
     assert np.ptp([c.q for c in frozen], axis=0).max() == 0.0
 
 
+def test_after_a_reset_nothing_moves_until_the_operator_asks_measured_or_not(nao: RobotModel) -> None:
+    def act(session: Session, time: float) -> None:
+        if time == 1.0:
+            session.tell(Event.FAULT, "it fell")
+        if time == 2.0:
+            session.tell(Event.RESET)
+        if time == 4.0:
+            session.tell(Event.CLUTCH)
+
+    story = play(nao, 6.0, lambda time: replace(relaxed(), time=time, support=None), act=act)
+    assert story.states() == ["calibrating", "fault", "clutched", "calibrating"]
+    idle = [t.command.q for t, at in zip(story.ticks, story.times, strict=True) if 2.0 < at < 4.0]
+    np.testing.assert_array_equal(idle, np.tile(nao.postures["stand"], (len(idle), 1)))
+    on = np.array([t.command.q for t, at in zip(story.ticks, story.times, strict=True) if at > 3.9])
+    assert (np.abs(np.diff(on, axis=0)) <= 0.9 * nao.speed * DT + 1e-9).all(), "and then it goes on without a jump"
+
+
 def test_frames_of_nothing_and_of_nonsense_are_survived(nao: RobotModel) -> None:
     rng = np.random.default_rng(0)
 

@@ -58,6 +58,7 @@ SIMULATED = {
     "sim_base_pos": np.zeros((5, 3)),
     "sim_base_quat": np.tile([1.0, 0.0, 0.0, 0.0], (5, 1)),
     "sim_q": np.zeros((5, 3)),
+    "sim_fsr": np.ones((5, 2, 4)),
     "sim_fell": True,
 }
 
@@ -107,6 +108,8 @@ BREAKS = {
     "provenance": {"provenance": "not json"},
     "format": {"format": "naoimitate-run/9"},
     "sim_q": {"sim_q": np.zeros((5, 2))},
+    "sim_fsr": {"sim_fsr": np.zeros((5, 8))},
+    "sim_fsr ": {"sim_fsr": np.full((5, 2, 4), -1.0)},
     "com ": {"com": np.full((5, 3), 1e300)},
     "human_time ": {"human_time": np.array([0.0, 0.0, 0.0, 0.0, np.inf])},
     "time  ": {"time": np.arange(5) * 1e-300},

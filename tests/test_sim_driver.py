@@ -15,6 +15,7 @@ from naoimitate.robot import RobotModel
 from naoimitate.robot.model import Array
 from naoimitate.sim.driver import MujocoDriver
 from naoimitate.sim.placement import stand_on_floor
+from naoimitate.sim.settings import SimSettings
 
 
 def command(robot: RobotModel, q: Array, support: str = "D", *, moved: Array | None = None) -> RobotCommand:
@@ -94,6 +95,25 @@ def test_connecting_again_starts_from_the_stand(nao: RobotModel) -> None:
     driver.connect()
     np.testing.assert_allclose(driver.read().q, nao.postures["stand"])
     assert driver.read().time == 0.0
+
+
+def leant_on(nao: RobotModel, **loops: bool) -> tuple[float, float]:
+    """How far (m) the torso gives way to a steady push of 8 N, in a first and in a second connection."""
+    driver = MujocoDriver(nao, SimSettings(stiffness=60.0), real_time=False, **loops)
+    places = []
+    for _ in range(2):
+        driver.model.opt.gravity[0] = 0.0
+        driver.connect()
+        stood = driver.advance(6.0).base_pos
+        driver.model.opt.gravity[0] = 8.0 / nao.mass
+        places.append(float((driver.advance(6.0).base_pos - stood)[0]))
+    return places[0], places[1]
+
+
+def test_with_balance_it_gives_way_less_in_every_connection(nao: RobotModel) -> None:
+    free, closed = leant_on(nao), leant_on(nao, balance=True)
+    assert free[0] > 0.004 and abs(closed[0]) < 0.5 * free[0]
+    assert closed[1] == pytest.approx(closed[0], abs=1e-6)
 
 
 def test_a_fall_shows_in_the_state(nao: RobotModel) -> None:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from naoimitate.robot.model import RobotModel
 
 DRIVERS = ("mujoco", "can", "naoqi", "none")
+FEELING = ("mujoco", "naoqi")
+"""Those with an inertial board and force sensors."""
 
 
 @click.command()
@@ -41,10 +43,23 @@ DRIVERS = ("mujoco", "can", "naoqi", "none")
     show_default=True,
     help="The head follows the operator's, or looks at a hand of the robot.",
 )
+@click.option(
+    "--shift",
+    type=click.Choice(["pendulum", "parabola"]),
+    default="pendulum",
+    show_default=True,
+    help="How the weight goes from foot to foot: as fast as balance allows, or by the paper's speed law.",
+)
 @click.option("--upper-body", is_flag=True, help="The robot stands, and imitates arms and head only.")
 @click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
 @click.option(
     "--fall", type=click.Choice(["limp", "brace"]), default="limp", show_default=True, help="Response to a fall."
+)
+@click.option(
+    "--feedback/--no-feedback",
+    default=False,
+    show_default=True,
+    help="Let the driver balance by the robot's sensors: --driver mujoco or naoqi.",
 )
 @click.option("--speed-limit", type=click.FloatRange(0.1, 1.0), default=1.0, help="Share of the usual speeds.")
 @click.option("--subject", type=click.Path(path_type=Path), metavar="FILE", help="Operator measured by 'calibrate'.")
@@ -98,7 +113,7 @@ def _setup(chosen: dict[str, Any], header: dict[str, Any]) -> Setup:
     from naoimitate.live.setup import Setup
 
     setup = Setup.of(header.get("setup")) if header else Setup()
-    for option in ("speed_limit", "upper_body", "mirror", "head"):
+    for option in ("speed_limit", "upper_body", "mirror", "head", "shift"):
         if option in chosen:
             setup = replace(setup, **{option: chosen[option]})
     if "no_filter" in chosen:
@@ -120,6 +135,10 @@ def _recorder(rig: Rig, options: dict[str, Any]) -> Recorder | None:
 
 
 def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
+    if options["feedback"] and options["driver"] not in FEELING:
+        raise click.UsageError(
+            f"--feedback needs a robot that feels its torso and feet: --driver {' or '.join(FEELING)}"
+        )
     if options["driver"] == "none":
         from naoimitate.hw.none import NoDriver
 
@@ -130,12 +149,13 @@ def _driver(options: dict[str, Any], robot: RobotModel) -> Driver:
         names = {key: options[f"can_{key}"] for key in ("interface", "channel", "codec")}
         return CanDriver(robot, **names, notice=click.echo)
     if options["driver"] == "naoqi":
-        from naoimitate.hw.naoqi import NaoqiDriver, NaoqiSettings
+        from naoimitate.hw.naoqi import NaoqiDriver
+        from naoimitate.hw.naoqi_settings import NaoqiSettings
 
-        return NaoqiDriver(robot, NaoqiSettings(url=options["url"]), notice=click.echo)
+        return NaoqiDriver(robot, NaoqiSettings(url=options["url"], balance=options["feedback"]), notice=click.echo)
     from naoimitate.sim.driver import MujocoDriver
 
-    return MujocoDriver(robot)
+    return MujocoDriver(robot, balance=options["feedback"])
 
 
 def _watch(options: dict[str, Any], driver: Driver) -> AbstractContextManager[object]:

@@ -78,7 +78,7 @@ class Writer:
         state = self._driver.state
         if state is None or state.base_pos is None or state.base_quat is None:
             return None
-        return Moved(state.q, state.base_pos, state.base_quat, state.fell)
+        return Moved(state.q, state.base_pos, state.base_quat, state.fsr, state.fell)
 
     def _next(self, out: Path) -> None:
         """Begin another run file; the one before is made of its journal at the end of the session."""

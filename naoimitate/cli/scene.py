@@ -83,6 +83,7 @@ def _run(attempt: Attempt, robot: RobotModel, operator: Motion) -> Run:
         human_time=attempt.time - attempt.time[0],
         step_time=attempt.step_time,
         sim_q=attempt.moved.q,
+        sim_fsr=attempt.moved.fsr,
         sim_base_pos=attempt.moved.base_pos,
         sim_base_quat=attempt.moved.base_quat,
         sim_fell=bool(attempt.fell.any()),

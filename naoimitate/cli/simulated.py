@@ -46,6 +46,7 @@ def simulated(run: Run, robot: RobotModel, stiffness: float | None = None, close
         sim_base_pos=result.base_pos,
         sim_base_quat=result.base_quat,
         sim_q=result.q,
+        sim_fsr=result.fsr,
         sim_fell=not result.survived,
     )
 

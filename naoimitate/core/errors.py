@@ -20,6 +20,10 @@ class CalibrationError(NaoimitateError):
     """A posture cannot serve as the T-pose, or a subject file cannot be used."""
 
 
+class SettingsError(NaoimitateError):
+    """A choice that does not exist."""
+
+
 class UnreachablePose(NaoimitateError):
     """No pose satisfies the hard constraints asked for."""
 

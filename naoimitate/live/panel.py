@@ -79,6 +79,8 @@ class Panel:
         state = self._session.state.value
         if self._session.state is State.CALIBRATING:
             state += f": hold a T-pose for {self._session.countdown:.1f} s"
+        if self._session.state is State.CLUTCHED:
+            state += ": nothing moves until you press c or hold a T-pose"
         if self._session.eye.complaint:
             state += f": {self._session.eye.complaint}"
         if self._session.reason:

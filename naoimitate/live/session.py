@@ -87,6 +87,7 @@ class Session:
         self._fresh: HumanFrame | None = None
         self._arrival, self._now, self._dt = -math.inf, math.nan, 0.01
         self._played = ""
+        """Who is imitated: ``operator``, ``T-pose`` or ``standing``; ``nobody`` after a reset, until somebody asks."""
         self._caused = self._began = False
         self._upper_body = self.imitator.upper_body
         self._told: list[tuple[Event, str]] = []
@@ -185,8 +186,9 @@ class Session:
         if event in (Event.LATE, Event.CLUTCH) and self.state in _OPERATED:
             self._kept = self._expected()
         action = self._fsm.take(event)
-        if action is Action.BEGIN:
+        if action in (Action.BEGIN, Action.REST):
             self._begin()
+            self._played = "standing" if action is Action.BEGIN else "nobody"
         elif action is Action.CALIBRATE:
             self._began, self._played = True, ""
         elif action is Action.BLEND or (action is Action.STAND and self._played == "operator"):
@@ -197,7 +199,7 @@ class Session:
         """From the robot's own stand; nobody has been seen yet."""
         self.imitator.use(self._stand_in)
         self.imitator.stand()
-        self._played, self._person, self.reason = "standing", None, ""
+        self._person, self.reason = None, ""
         self._arrival = -math.inf
 
     def _next_command(self) -> RobotCommand:
@@ -208,6 +210,8 @@ class Session:
             assert self.subject is not None
             self._play("operator", self.subject, self._live.blend_in)
             return self.imitator.step(self._expected(), self._dt)
+        if self.state is State.CLUTCHED and self._played == "nobody":
+            return self.imitator.hold(self._still, self._dt)
         showing = self.state is State.CALIBRATING
         self._play("T-pose" if showing else "standing", self._stand_in, self._live.blend_back)
         return self.imitator.step(self._tpose if showing else self._still, self._dt)

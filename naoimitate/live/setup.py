@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
+from naoimitate.balance.offset import OffsetLaw
 from naoimitate.calib.subject import parse_subject
 from naoimitate.core.errors import StreamError
-from naoimitate.gaze import HANDS
 from naoimitate.live.session import Session, SessionSettings
 from naoimitate.robot.model import RobotModel
-from naoimitate.settings import Settings
+from naoimitate.settings import CHOICES, SHIFTS, Settings
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class Setup:
 
     speed_limit: share of the usual speeds. upper_body: the robot stands, and imitates arms and head only. mirror: the
     operator faces the robot. filtered: landmarks are filtered. subject: text of a subject file, empty for none. head:
-    as in ``Settings``.
+    as in ``Settings``. shift: as in ``OffsetLaw``.
     """
 
     speed_limit: float = 1.0
@@ -28,6 +28,7 @@ class Setup:
     filtered: bool = True
     subject: str = ""
     head: str = "follow"
+    shift: str = "pendulum"
 
     def session(self, robot: RobotModel) -> Session:
         """A new session; CalibrationError where the subject's text is none."""
@@ -39,7 +40,8 @@ class Setup:
             head_speed=share * limits.head_speed,
             joint_share=share * limits.joint_share,
         )
-        settings = replace(Settings(), limits=slower, upper_body=self.upper_body, head=self.head)
+        offset = OffsetLaw(shift=self.shift)
+        settings = replace(Settings(), limits=slower, offset=offset, upper_body=self.upper_body, head=self.head)
         subject = parse_subject(self.subject, "the subject") if self.subject else None
         return Session(robot, settings, SessionSettings(filtered=self.filtered, mirror=self.mirror), subject)
 
@@ -63,5 +65,7 @@ class Setup:
 def _possible(name: str, value: Any) -> bool:
     """Whether a value of the right type can be the operator's choice."""
     if name == "head":
-        return value == "follow" or value in HANDS
+        return value in CHOICES["head"]
+    if name == "shift":
+        return value in SHIFTS
     return name != "speed_limit" or 0.0 < value <= 1.0

@@ -45,6 +45,7 @@ class Run:
     given_up: (T,) bits of ``GivenUp``. step_time: (T,) s of wall time. ik_iterations: (T,).
     session, latency: (T,) state of a live session; (T,) s from datagram to driver, NaN where none caused the step.
     sim_base_pos, sim_base_quat, sim_q, sim_fell: as the simulated robot really moved, and whether it fell.
+    sim_fsr: (T, 2, 4) N, what its force sensors read, left and right foot, columns as ``hw.driver.FSR_NAMES``.
     """
 
     robot: str
@@ -80,6 +81,7 @@ class Run:
     sim_base_pos: Array | None = None
     sim_base_quat: Array | None = None
     sim_q: Array | None = None
+    sim_fsr: Array | None = None
     sim_fell: bool | None = None
     format: str = FORMAT
 

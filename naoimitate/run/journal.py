@@ -32,11 +32,13 @@ def journal_path(out: Path) -> Path:
 
 
 class Moved(NamedTuple):
-    """As the simulated robot really was at a frame: joints (J,) rad, torso (3,) m and (4,), whether it had fallen."""
+    """As the simulated robot really was at a frame: joints (J,) rad, torso (3,) m and (4,), force sensors (2, 4) N,
+    whether it had fallen."""
 
     q: Array
     base_pos: Array
     base_quat: Array
+    fsr: Array
     fell: bool
 
 
@@ -93,9 +95,8 @@ class Journal:
             "step_time": np.array(step),
         }
         if None not in moved:
-            q, base_pos, base_quat, fell = zip(*moved, strict=True)
-            arrays |= {"sim_q": np.array(q), "sim_base_pos": np.array(base_pos), "sim_base_quat": np.array(base_quat)}
-            arrays["sim_fell"] = np.array(fell)
+            names = ("sim_q", "sim_base_pos", "sim_base_quat", "sim_fsr", "sim_fell")
+            arrays |= dict(zip(names, map(np.array, zip(*moved, strict=True)), strict=True))
         self._write(arrays)
         self._rows.clear()
 

@@ -48,11 +48,18 @@ class Replay:
         """Height of the lowest outline point of a sole over the floor, (N,) m."""
         return np.asarray(self.soles[side][:, :, 2].min(axis=1))
 
-    def margins(self, support: npt.NDArray[np.str_]) -> Array:
-        """Signed distance of the centre of mass to the edge of the support polygon, (N,) m, positive inside."""
+    def margins(self, support: npt.NDArray[np.str_], points: Array | None = None) -> Array:
+        """Signed distance of points (N, 2) m, the centre of mass where none are given, to the edge of the support
+        polygon, (N,) m, positive inside; NaN where a point is."""
+        points = self.com[:, :2] if points is None else points
         left, right = self.soles[0][:, :, :2], self.soles[1][:, :, :2]
         carries = np.array([LOADED[mode] for mode in support], dtype=np.bool_).reshape(-1, 2)
-        return np.asarray(_margins(left, right, carries, self.com))
+        margins = _margins(left, right, carries, np.ascontiguousarray(points))
+        return np.where(np.isfinite(points).all(axis=1), margins, np.nan)
+
+    def on_sole(self, robot: RobotModel, side: int, points: Array) -> Array:
+        """Points (K, 2) m of a sole, given in its frame, in the world: (N, K, 3) m."""
+        return _on_sole(robot, SIDES[side], points, self.links_pos, self.links_rot, self.base_pos, self.base_rot)
 
 
 def replay(robot: RobotModel, q: Array, base_pos: Array, base_quat: Array) -> Replay:
@@ -61,12 +68,8 @@ def replay(robot: RobotModel, q: Array, base_pos: Array, base_quat: Array) -> Re
     base_rot = np.array([matrix_from_quat(quat) for quat in base_quat]).reshape(-1, 3, 3)
     soles, up = [], []
     for side in SIDES:
-        point = robot.points[f"{side}_sole"]
-        outline = np.column_stack([robot.soles[side], np.zeros(len(robot.soles[side]))]) + point.offset
-        row = point.joint + 1
-        local = links_pos[:, None, row] + np.einsum("nij,kj->nki", links_rot[:, row], outline)
-        soles.append(base_pos[:, None] + np.einsum("nij,nkj->nki", base_rot, local))
-        up.append(np.einsum("nij,nj->ni", base_rot, links_rot[:, row, :, 2]))
+        soles.append(_on_sole(robot, side, robot.soles[side], links_pos, links_rot, base_pos, base_rot))
+        up.append(np.einsum("nij,nj->ni", base_rot, links_rot[:, robot.points[f"{side}_sole"].joint + 1, :, 2]))
     return Replay(
         links_pos=links_pos,
         links_rot=links_rot,
@@ -79,11 +82,27 @@ def replay(robot: RobotModel, q: Array, base_pos: Array, base_quat: Array) -> Re
     )
 
 
+def _on_sole(
+    robot: RobotModel, side: str, points: Array, links_pos: Array, links_rot: Array, base_pos: Array, base_rot: Array
+) -> Array:
+    sole = robot.points[f"{side}_sole"]
+    row, in_link = sole.joint + 1, np.column_stack([points, np.zeros(len(points))]) + sole.offset
+    local = links_pos[:, None, row] + np.einsum("nij,kj->nki", links_rot[:, row], in_link)
+    return np.asarray(base_pos[:, None] + np.einsum("nij,nkj->nki", base_rot, local))
+
+
 def frames(run: Run, robot: RobotModel) -> Replay:
     """The commanded poses at the frames of a run. Raises RunFileError when the run is of another robot."""
     if tuple(run.joint_names) != robot.joint_names:
         raise RunFileError(f"the run's joints are not those of {robot.name} {robot.version}; load the robot it names")
     return replay(robot, run.q, run.base_pos, run.base_quat)
+
+
+def moved(run: Run, robot: RobotModel) -> Replay | None:
+    """The poses of the simulated robot at the frames of a run; None without simulation."""
+    if run.sim_q is None or run.sim_base_pos is None or run.sim_base_quat is None:
+        return None
+    return replay(robot, run.sim_q, run.sim_base_pos, run.sim_base_quat)
 
 
 def midpoints(run: Run, robot: RobotModel) -> Replay:
@@ -125,12 +144,12 @@ def _forward_all(tree: Tree, q: Array) -> tuple[Array, Array, Array]:
 
 
 @njit(cache=True)
-def _margins(left: Array, right: Array, carries: npt.NDArray[np.bool_], com: Array) -> Array:
-    margin = np.empty(com.shape[0])
-    for i in range(com.shape[0]):
+def _margins(left: Array, right: Array, carries: npt.NDArray[np.bool_], points: Array) -> Array:
+    margin = np.empty(points.shape[0])
+    for i in range(points.shape[0]):
         if carries[i, 0] and carries[i, 1]:
             hull = convex_hull(np.concatenate((left[i], right[i])))
         else:
             hull = convex_hull(left[i] if carries[i, 0] else right[i])
-        margin[i] = polygon_margin(hull, com[i, 0], com[i, 1])
+        margin[i] = polygon_margin(hull, points[i, 0], points[i, 1])
     return margin

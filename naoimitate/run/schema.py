@@ -74,6 +74,7 @@ SCHEMA: dict[str, Key] = {
     "sim_base_pos": Key(float, ("T", 3), optional=True),
     "sim_base_quat": Key(float, ("T", 4), optional=True),
     "sim_q": Key(float, ("T", "J"), optional=True),
+    "sim_fsr": Key(float, ("T", 2, 4), optional=True),
     "sim_fell": Key(bool, optional=True),
 }
 
@@ -177,6 +178,7 @@ _RULES: tuple[tuple[str, Callable[[Arrays], bool], str], ...] = (
     ("hand_opening", lambda a: _fractions(a["hand_opening"]), "leaves 0 to 1"),
     ("scale", lambda a: bool(np.all(a["scale"] > 0.0)), "is not positive"),
     ("step_time", lambda a: bool(np.all(a["step_time"] >= 0.0)), "is negative"),
+    ("sim_fsr", lambda a: bool(np.all(a["sim_fsr"] >= 0.0)), "is negative"),
     ("ik_iterations", lambda a: bool(np.all(a["ik_iterations"] >= 0)), "is negative"),
     ("provenance", _is_json_object, "is not a JSON object"),
 )

@@ -8,7 +8,8 @@ from naoimitate.run.file import Run
 from naoimitate.run.limits import limits
 from naoimitate.run.measure import Measure
 from naoimitate.run.overlap import overlap
-from naoimitate.run.replay import frames, midpoints
+from naoimitate.run.pressure import pressure
+from naoimitate.run.replay import frames, midpoints, moved
 from naoimitate.run.similarity import similarity
 from naoimitate.run.stability import stability
 from naoimitate.run.support import support
@@ -21,10 +22,11 @@ def score_run(run: Run, robot: RobotModel) -> list[Measure]:
 
     robot: the model that the run names. Raises RunFileError when the run's joints are not that robot's.
     """
-    at, between = frames(run, robot), midpoints(run, robot)
+    at, between, simulated = frames(run, robot), midpoints(run, robot), moved(run, robot)
     return [
         *stability(run, at, between),
-        *zmp(run, robot, at),
+        *zmp(run, robot, at, simulated),
+        *pressure(run, robot, simulated),
         *contact(run, robot, at),
         *limits(run, robot),
         *overlap(robot, at),

@@ -14,7 +14,6 @@ not seen; servos do not follow it either.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +24,7 @@ from naoimitate.core.physics import GRAVITY
 from naoimitate.robot.model import RobotModel
 from naoimitate.run.file import Run
 from naoimitate.run.measure import Measure
-from naoimitate.run.replay import Array, Replay, replay
+from naoimitate.run.replay import Array, Replay
 
 SMOOTHING = 0.02
 """s, standard deviation of the weights; the time by which position servos of small robots lag behind a command."""
@@ -110,14 +109,11 @@ def zmp_of(robot: RobotModel, time: Array, poses: Replay) -> Array:
 
 def zmp_margins(robot: RobotModel, run: Run, poses: Replay) -> Array:
     """Distance (T,) m of the zero-moment point to the edge of the stance soles as planned, negative outside; or NaN."""
-    point = zmp_of(robot, run.time, poses)
-    known = np.isfinite(point[:, 0])
-    margin = replace(poses, com=np.nan_to_num(point)).margins(run.support)
-    return np.where(known, margin, np.nan)
+    return poses.margins(run.support, zmp_of(robot, run.time, poses))
 
 
-def zmp(run: Run, robot: RobotModel, poses: Replay) -> list[Measure]:
-    """The measures of the zero-moment point: of the command, and of what the simulated robot made of it."""
+def zmp(run: Run, robot: RobotModel, poses: Replay, moved: Replay | None) -> list[Measure]:
+    """The measures of the zero-moment point: of the command, and of what the simulated robot made of it (``moved``)."""
     margin = zmp_margins(robot, run, poses)
     known = MM * margin[np.isfinite(margin)]
     there = len(known) > 0
@@ -136,12 +132,14 @@ def zmp(run: Run, robot: RobotModel, poses: Replay) -> list[Measure]:
             "mm",
         ),
         Measure("zmp_outside_frames", "frames with the ZMP outside", int((known < 0.0).sum()) if there else None),
-        Measure("sim_zmp_margin_min_mm", "ZMP of the simulated motion, least margin", _simulated(run, robot), "mm"),
+        Measure(
+            "sim_zmp_margin_min_mm", "ZMP of the simulated motion, least margin", _simulated(run, robot, moved), "mm"
+        ),
     ]
 
 
-def _simulated(run: Run, robot: RobotModel) -> float | None:
-    if run.sim_q is None or run.sim_base_pos is None or run.sim_base_quat is None:
+def _simulated(run: Run, robot: RobotModel, moved: Replay | None) -> float | None:
+    if moved is None:
         return None
-    margin = zmp_margins(robot, run, replay(robot, run.sim_q, run.sim_base_pos, run.sim_base_quat))
+    margin = zmp_margins(robot, run, moved)
     return MM * float(np.nanmin(margin)) if np.isfinite(margin).any() else None
