@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from naoimitate.core.frames import Array
 from naoimitate.hw.learning import LearningCompensation
+from naoimitate.hw.pacing import Pacing
 from naoimitate.hw.servo_command import ServoCommand
 from naoimitate.hw.stabiliser import Stabiliser
 from naoimitate.robot.model import RobotModel
@@ -14,4 +15,6 @@ def feedback(robot: RobotModel, stiffness: Array | float, period: float) -> Serv
 
     stiffness: what the servos are taken for, (J,) or one for all, N m/rad. period: s between two calls.
     """
-    return Stabiliser(robot, LearningCompensation(robot, stiffness, period), period)
+    learning = LearningCompensation(robot, stiffness, period)
+    balance = Stabiliser(robot, learning, period, softness=lambda: learning.factor)
+    return Pacing(robot, balance, period)

@@ -104,11 +104,11 @@ def test_a_sole_that_carries_in_the_air_is_raised_and_comes_back(march: Plan) ->
         loaded = state.fsr.copy()
         loaded[1] = 0.05 * WEIGHT
         loop(target, replace(state, fsr=loaded))
-    assert loop.raised[1] == pytest.approx(DEFAULT.step_height)
+    assert loop.raised[1] == pytest.approx(DEFAULT.heights.most)
     assert loop.target is not None
     planted = PlantedShift(NAO)
     before, after = planted.pose(target.q, "L"), planted.pose(loop.target.q, "L")
-    assert after.sole_pos[1, 2] - before.sole_pos[1, 2] == pytest.approx(DEFAULT.step_height, abs=5e-4)
+    assert after.sole_pos[1, 2] - before.sole_pos[1, 2] == pytest.approx(DEFAULT.heights.most, abs=5e-4)
     for step in range(20, 120):
         loop(target, as_planned(target, step * PERIOD))
     assert loop.raised[1] == pytest.approx(0.0, abs=1e-6)
@@ -122,7 +122,7 @@ def test_a_sole_that_should_carry_is_lowered_until_it_does(march: Plan) -> None:
         hanging[0] = 0.0
         loop(target, replace(state, fsr=hanging))
     lowered = float(loop.raised[0])
-    assert lowered == pytest.approx(-40 * PERIOD * DEFAULT.lowering, abs=2e-4)
+    assert lowered == pytest.approx(-40 * PERIOD * DEFAULT.heights.lowering, abs=2e-4)
 
 
 ANGLES = st.floats(-0.6, 0.6) | st.sampled_from([np.nan, np.inf, -np.inf, 1e9])
@@ -159,7 +159,7 @@ def _check_stance(target: Target, q: np.ndarray) -> None:
         level = np.array([1.0, 1.0, 0.0])
         places = after.sole_pos[1] * level, after.sole_rot[1], before.sole_pos[1] * level, before.sole_rot[1]
         assert outline_travel(LEGS, 1, *places) < 1e-4, "soles keep their places"
-        assert abs(after.sole_pos[1, 2]) <= 2.0 * DEFAULT.step_height + 1e-3
+        assert abs(after.sole_pos[1, 2]) <= 2.0 * DEFAULT.heights.most + 1e-3
     planned = support_margin(LEGS, before.sole_pos, before.sole_rot, left, right, before.com)
     margin = support_margin(LEGS, after.sole_pos, after.sole_rot, left, right, after.com)
     assert margin >= min(DEFAULT.margin, planned) - 3e-3
