@@ -3,7 +3,8 @@
 A sole that carries and should not is raised; one that should and does not is lowered until it does: early and late
 contact, on a floor that is not where the plan has it. A sole that is about to leave the floor, because the plan already
 has the whole weight on the other, is raised until it carries nothing: servos that sag, and senses that are a little
-wrong, leave weight on it, and a foot that carries when it is lifted throws the body over.
+wrong, leave weight on it, and a foot that carries when it is lifted throws the body over. One that has just come down
+is left alone: it waits for its weight.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ class HeightSettings:
     """Load, averaged over ``averaged``, that such a sole may carry."""
     averaged: float = 0.05
     """[s]"""
+    landed: float = 0.5
+    """[s] that a sole has been down before it can be about to leave."""
 
 
 HEIGHTS = HeightSettings()
@@ -49,7 +52,7 @@ class SoleHeights:
 
     def __init__(self, period: float, settings: HeightSettings = HEIGHTS) -> None:
         self._period, self._s = period, settings
-        self._load = np.zeros(2)
+        self._load, self._down = np.zeros(2), np.full(2, np.inf)
         self.raised = np.zeros(2)
         """[m] of the left and the right sole now."""
 
@@ -66,9 +69,11 @@ class SoleHeights:
             change = np.clip(load, 0.0, 1.0) - self._load
             self._load = self._load + self._period / (s.averaged + self._period) * change
             for i, side in enumerate(SIDES):
-                if support not in ("D", side.upper()) and load[i] > s.loaded:
+                air = support not in ("D", side.upper())
+                self._down[i] = 0.0 if air else self._down[i] + self._period
+                if air and load[i] > s.loaded:
                     rate[i] = s.raising
-                elif support == "D" and share[i] < s.idle and steady:
+                elif self._down[i] > s.landed and share[i] < s.idle and steady:
                     rate[i] = s.easing if self._load[i] > s.eased else 0.0
                 elif share[i] > s.due and load[i] < s.unloaded:
                     rate[i] = -s.lowering

@@ -37,6 +37,7 @@ class SwayMeter:
         self._planted, self._period, self._lag = planted, period, lag
         self._support, self._place, self._velocity = "", np.zeros(2), np.zeros(2)
         self._seen: Array | None = None
+        self._turning = np.zeros(3)
         self._slip, self._share = np.zeros(2), period / (SMOOTHING + period)
 
     def follow(self, target: Target) -> None:
@@ -52,12 +53,13 @@ class SwayMeter:
         """What a state whose angles and joints are known says; without a gyro the velocity is NaN."""
         up = np.array(up_from_angles(state.angles))
         place, way = self._centre(target._replace(q=state.q), up)
+        turning = state.gyro - up * (up @ state.gyro)
         if self._seen is not None:
-            turning = state.gyro - up * (up @ state.gyro)
-            velocity = (level(up) @ (np.cross(turning, way) + (way - self._seen) / self._period))[:2]
+            turned = np.cross(0.5 * (turning + self._turning), 0.5 * (way + self._seen))
+            velocity = (level(up) @ (turned + (way - self._seen) / self._period))[:2]
             steadied = np.where(np.isfinite(self._slip), self._slip, 0.0)
             self._slip = steadied + self._share * (self._velocity - velocity - steadied)
-        self._seen = way
+        self._seen, self._turning = way, turning
         return Sway(self._place - place, self._slip)
 
     def lose(self) -> None:
