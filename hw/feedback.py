@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from naoimitate.core.frames import Array
 from naoimitate.hw.learning import LearningCompensation
+from naoimitate.hw.pacing import Pacing
 from naoimitate.hw.servo_command import ServoCommand, servo_command
 from naoimitate.hw.stabiliser import Stabiliser
 from naoimitate.robot.model import RobotModel
@@ -17,4 +18,6 @@ def feedback(robot: RobotModel, stiffness: Array | float | None, period: float) 
     """
     if stiffness is None:
         return Stabiliser(robot, servo_command(robot, None), period)
-    return Stabiliser(robot, LearningCompensation(robot, stiffness, period), period)
+    learning = LearningCompensation(robot, stiffness, period)
+    balance = Stabiliser(robot, learning, period, softness=lambda: learning.factor)
+    return Pacing(robot, balance, period)

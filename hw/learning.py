@@ -45,7 +45,9 @@ class LearningSettings:
     lag: float = 0.03
     """[s] by which servos follow their command: a sag is measured against the command of that time ago."""
     slow: float = 0.2
-    """[rad/s] A leg with a faster joint tells nothing: its joints are behind for other reasons."""
+    """[rad/s] A leg with a faster joint tells nothing: its joints are behind for other reasons..."""
+    settled: float = 0.15
+    """...[s] over which that speed is averaged: balance that trembles with its sensors' noise is no motion."""
     telling: float = math.radians(0.1)
     """[rad] Norm of the legs' nominal sags under which they tell nothing, as with legs that are straight."""
     lost: float = 0.2
@@ -75,7 +77,8 @@ class LearningCompensation:
     ) -> None:
         self._gravity, self._robot, self._stiffness = GravityCompensation(robot), robot, stiffness
         self._period, self._s = period, settings
-        self._legs = np.array([j for side in SIDES for j in robot.chains[f"{side}_leg"]])
+        self._legs = {side.upper(): np.array(robot.chains[f"{side}_leg"]) for side in SIDES}
+        self._legs["D"] = np.concatenate([self._legs["L"], self._legs["R"]])
         self._weight = GRAVITY * robot.mass
         self.factor = 1.0
         """What is applied: how many times as far the servos hang as the nominal stiffness says."""
@@ -83,7 +86,7 @@ class LearningCompensation:
         self._products = self._squares = self._time = 0.0
         self._learned = 1.0
         self._behind: Array | None = None
-        self._before: Array | None = None
+        self._settled: Array | None = None
 
     def __call__(self, target: Target, state: RobotState) -> Array:
         """Servo angles (J,) rad that end up at a target."""
@@ -93,7 +96,8 @@ class LearningCompensation:
         command = self._offset_from(nominal, sag)
         behind = command if self._behind is None else self._behind
         self._behind = behind + self._period / (self._s.lag + self._period) * (command - behind)
-        self._before = target.q
+        settled = target.q if self._settled is None else self._settled
+        self._settled = settled + self._period / (self._s.settled + self._period) * (target.q - settled)
         return command
 
     def _offset_from(self, nominal: Array, sag: Array) -> Array:
@@ -110,7 +114,7 @@ class LearningCompensation:
         new, self._time = state.time > self._time, state.time
         if not new or self._behind is None or not self._tells(target, state):
             return
-        s, legs = self._s, self._legs
+        s, legs = self._s, self._legs[target.support]
         share = self._period / s.memory
         torso = quat_from_angles(state.angles)
         nominal = (self._gravity.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
@@ -127,9 +131,9 @@ class LearningCompensation:
 
     def _tells(self, target: Target, state: RobotState) -> bool:
         """Whether the legs hang in the posture that they are sent, under the robot's weight, and nearly at rest."""
-        s, legs = self._s, self._legs
-        assert self._behind is not None and self._before is not None
-        if np.abs(target.q - self._before)[legs].max() > s.slow * self._period:
+        s, legs = self._s, self._legs[target.support]
+        assert self._behind is not None and self._settled is not None
+        if np.abs(target.q - self._settled)[legs].max() > s.slow * s.settled:
             return False
         if not np.abs(self._behind - state.q)[legs].max() < s.lost:  # NaN is no
             return False

@@ -14,6 +14,7 @@ from sim_poses import one_foot_pose
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.hw.learning import LearningCompensation, LearningSettings
+from naoimitate.hw.planted_shift import PlantedShift
 from naoimitate.hw.servo_command import ServoCommand, Target, servo_command
 from naoimitate.robot import RobotModel, load_robot
 from naoimitate.robot.model import Array
@@ -102,6 +103,29 @@ def test_nothing_is_learned_from_a_state_that_is_not_known(change: Callable[[Rob
     learning = LearningCompensation(NAO, NOMINAL, PERIOD)
     learning(STAND, replace(hanging(1.0), time=1.0))
     assert listen(learning, change) == 1.0
+
+
+def test_balance_that_trembles_does_not_keep_it_from_learning() -> None:
+    """Its target is a little elsewhere in every period, as far as a stabiliser moves it for its sensors' noise."""
+    learning, rng = LearningCompensation(NAO, NOMINAL, PERIOD), np.random.default_rng(0)
+    planted = PlantedShift(NAO)
+    for i in range(200):
+        q = planted.moved(STAND, rng.normal(0.0, 0.001, 2), 0.0, NAO.lower, NAO.upper)
+        assert q is not None
+        learning(STAND._replace(q=q), hanging(3.0, moment=PERIOD * (i + 1)))
+    assert learning.factor > 2.0
+
+
+def test_on_one_foot_the_other_leg_may_move_while_it_learns() -> None:
+    learning, q = LearningCompensation(NAO, NOMINAL, PERIOD), one_foot_pose(NAO, "l")
+    base = stand_on_floor(NAO, q, "l")
+    fsr = np.array([[NAO.mass * 9.81 / 4.0] * 4, [0.0] * 4])
+    for i in range(200):
+        kicking = q.copy()
+        kicking[NAO.joint("RKneePitch")] += 0.3 * np.sin(0.1 * i)
+        target = Target(kicking, *base, "L")
+        learning(target, replace(hanging(3.0, target, PERIOD * (i + 1)), fsr=fsr, angles=np.zeros(2)))
+    assert learning.factor > 2.0
 
 
 def test_what_was_learned_stays_when_the_state_gets_lost() -> None:

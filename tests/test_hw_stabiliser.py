@@ -15,6 +15,7 @@ from naoimitate.balance.legs import LegLimits, build_legs
 from naoimitate.core.physics import GRAVITY
 from naoimitate.gate import build_gate, outline_travel, range_excess, support_margin
 from naoimitate.hw.driver import RobotState
+from naoimitate.hw.learning import LearningCompensation
 from naoimitate.hw.planted_shift import PlantedShift
 from naoimitate.hw.servo_command import Target, servo_command
 from naoimitate.hw.stabiliser import DEFAULT, Stabiliser
@@ -104,11 +105,11 @@ def test_a_sole_that_carries_in_the_air_is_raised_and_comes_back(march: Plan) ->
         loaded = state.fsr.copy()
         loaded[1] = 0.05 * WEIGHT
         loop(target, replace(state, fsr=loaded))
-    assert loop.raised[1] == pytest.approx(DEFAULT.step_height)
+    assert loop.raised[1] == pytest.approx(DEFAULT.heights.most)
     assert loop.target is not None
     planted = PlantedShift(NAO)
     before, after = planted.pose(target.q, "L"), planted.pose(loop.target.q, "L")
-    assert after.sole_pos[1, 2] - before.sole_pos[1, 2] == pytest.approx(DEFAULT.step_height, abs=5e-4)
+    assert after.sole_pos[1, 2] - before.sole_pos[1, 2] == pytest.approx(DEFAULT.heights.most, abs=5e-4)
     for step in range(20, 120):
         loop(target, as_planned(target, step * PERIOD))
     assert loop.raised[1] == pytest.approx(0.0, abs=1e-6)
@@ -122,10 +123,64 @@ def test_a_sole_that_should_carry_is_lowered_until_it_does(march: Plan) -> None:
         hanging[0] = 0.0
         loop(target, replace(state, fsr=hanging))
     lowered = float(loop.raised[0])
-    assert lowered == pytest.approx(-40 * PERIOD * DEFAULT.lowering, abs=2e-4)
+    assert lowered == pytest.approx(-40 * PERIOD * DEFAULT.heights.lowering, abs=2e-4)
+
+
+def about_to_lift(march: Plan) -> int:
+    """A frame in which both feet are planned down and the plan has long had the whole weight on the left one."""
+    return int(np.flatnonzero(march.support == "L")[0]) - 10
+
+
+def test_a_sole_is_eased_before_it_leaves_the_floor(march: Plan) -> None:
+    loop, target = stabiliser(), target_at(march, about_to_lift(march))
+    assert target.support == "D"
+    for step in range(100):
+        state = as_planned(target, step * PERIOD)
+        left = 0.08 if loop.raised[1] < 0.002 else 0.0
+        loop(target, replace(state, fsr=WEIGHT / 4.0 * np.array([[1.0 - left] * 4, [left] * 4])))
+    assert 0.002 <= loop.raised[1] < 0.004, "until it carries nothing, and no farther"
+
+
+@pytest.mark.parametrize("wrong", ["CoM", "load", "just landed"])
+def test_a_sole_that_may_be_needed_is_not_eased(march: Plan, wrong: str) -> None:
+    loop, target = stabiliser(), target_at(march, about_to_lift(march))
+    load = WEIGHT / 4.0 * np.array([[0.92] * 4, [0.08] * 4])
+    if wrong == "just landed":
+        in_air = target._replace(support="L")
+        loop(in_air, as_planned(in_air, -PERIOD))
+    for step in range(40):
+        state = replace(as_planned(target, step * PERIOD), fsr=load)
+        if wrong == "CoM":
+            state = replace(state, angles=state.angles + np.array([0.08, 0.0]))
+        loop(target, state if wrong != "load" else replace(state, fsr=np.full((2, 4), np.nan)))
+    assert loop.raised[1] <= 0.0
+
+
+def moved_by_gyro(march: Plan, frame: int, turning: float, softness: float = 1.0) -> float:
+    """How far to the left the body is moved when the gyro says that the robot rolls to its right."""
+    loop = Stabiliser(NAO, lambda target, state: target.q, PERIOD, softness=lambda: softness)
+    target = target_at(march, frame)
+    for step in range(20):
+        loop(target, replace(as_planned(target, step * PERIOD), gyro=np.array([turning, 0.0, 0.0])))
+    return float(loop.damped[1])
+
+
+def test_the_body_is_moved_against_its_sway_in_proportion_to_how_soft_the_servos_are(march: Plan) -> None:
+    one_foot = int(np.flatnonzero(march.support == "L")[60])
+    firm, soft = (moved_by_gyro(march, one_foot, 0.1, softness) for softness in (1.0, 3.0))
+    assert firm == pytest.approx(0.1 * 0.27 * DEFAULT.damping[1], rel=0.25)
+    assert soft == pytest.approx(3.0 * firm, rel=0.05)
+    assert moved_by_gyro(march, one_foot, -0.1) == pytest.approx(-firm, rel=0.05)
+    assert abs(moved_by_gyro(march, one_foot, 100.0, 5.0)) <= DEFAULT.most_damping + SMALL
+    assert moved_by_gyro(march, 50, 0.1) == pytest.approx(DEFAULT.on_both * firm, rel=0.25), "on both feet"
+
+
+def test_without_a_gyro_nothing_is_damped(march: Plan) -> None:
+    assert moved_by_gyro(march, 50, math.nan) == 0.0
 
 
 ANGLES = st.floats(-0.6, 0.6) | st.sampled_from([np.nan, np.inf, -np.inf, 1e9])
+TURNING = st.floats(-5.0, 5.0) | st.sampled_from([np.nan, 1e9])
 LOADS = st.floats(-5.0, 60.0) | st.sampled_from([np.nan, np.inf, 1e9])
 
 
@@ -133,15 +188,19 @@ LOADS = st.floats(-5.0, 60.0) | st.sampled_from([np.nan, np.inf, 1e9])
 @settings(max_examples=25, deadline=None)
 def test_whatever_it_is_told_it_asks_for_a_safe_posture(march: Plan, data: st.DataObject) -> None:
     """In range, in steps, on planted soles, with the CoM inside them: for any senses, true, wrong, or absurd."""
-    loop, gate = stabiliser(), build_gate(NAO)
+    softness = data.draw(st.sampled_from([1.0, 5.0]))
+    loop = Stabiliser(NAO, lambda target, state: target.q, PERIOD, softness=lambda: softness)
+    gate = build_gate(NAO)
     rng = np.random.default_rng(data.draw(st.integers(0, 2**31)))
     frame, last, time = data.draw(st.integers(0, len(march.time) - 80)), None, 0.0
     for _ in range(6):
         angles = np.array([data.draw(ANGLES), data.draw(ANGLES)])
+        gyro = np.array([data.draw(TURNING), data.draw(TURNING), 0.0])
         fsr = np.array([[data.draw(LOADS)] * 4 for _ in range(2)])
         for _ in range(12):
             target = target_at(march, frame)
-            state = replace(as_planned(target, time), angles=angles, fsr=fsr, q=target.q + rng.normal(0.0, 0.02, 24))
+            state = replace(as_planned(target, time), angles=angles, gyro=gyro, fsr=fsr)
+            state = replace(state, q=target.q + rng.normal(0.0, 0.02, 24))
             q = loop(target, state)
             assert range_excess(gate, q) <= SMALL
             _check_stance(target, q)
@@ -159,7 +218,7 @@ def _check_stance(target: Target, q: np.ndarray) -> None:
         level = np.array([1.0, 1.0, 0.0])
         places = after.sole_pos[1] * level, after.sole_rot[1], before.sole_pos[1] * level, before.sole_rot[1]
         assert outline_travel(LEGS, 1, *places) < 1e-4, "soles keep their places"
-        assert abs(after.sole_pos[1, 2]) <= 2.0 * DEFAULT.step_height + 1e-3
+        assert abs(after.sole_pos[1, 2]) <= 2.0 * DEFAULT.heights.most + 1e-3
     planned = support_margin(LEGS, before.sole_pos, before.sole_rot, left, right, before.com)
     margin = support_margin(LEGS, after.sole_pos, after.sole_rot, left, right, after.com)
     assert margin >= min(DEFAULT.margin, planned) - 3e-3
@@ -189,3 +248,20 @@ def test_it_does_no_harm_where_all_is_as_planned(march: Plan) -> None:
 def test_it_survives_what_fells_the_open_loop(march: Plan, disturbance: Disturbance) -> None:
     assert not outcome(march, disturbance, False).survived
     assert outcome(march, disturbance, True).survived
+
+
+def test_soft_servos_survive_a_walk_at_speed() -> None:
+    """60 N m/rad taken for 300: the robot sways on one foot, and only damping keeps it up."""
+    run = imitate(load_motion("builtin:walk"), NAO)
+    walk = Plan("walk", run.time, run.q, run.base_pos, run.base_quat, run.support, run.hand_opening)
+    soft = Disturbance(stiffness=60.0)
+    assert play(NAO, walk, soft, closed=True).survived
+    learning = LearningCompensation(NAO, 300.0, PERIOD)
+    undamped = replace(DEFAULT, damping=(0.0, 0.0))
+    assert not play(NAO, walk, soft, control=Stabiliser(NAO, learning, PERIOD, undamped)).survived
+
+
+@pytest.mark.parametrize("at", [0.27, 0.67])
+def test_commands_lost_in_a_shift_of_weight_are_survived(march: Plan, at: float) -> None:
+    lost = Disturbance(drop_time=0.2, drop_at=at, delay=0.02, noise=1.0)
+    assert play(NAO, march, lost, closed=True).survived
