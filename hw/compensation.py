@@ -30,6 +30,8 @@ class GravityCompensation:
         self._feet = np.array([robot.points[f"{side}_sole"].joint for side in SIDES])
         self.sole_offset = np.array([_sole_centre(robot, side) for side in SIDES])
         self._sole = np.zeros((2, 3))
+        self.share = np.zeros(2)
+        """Share of the weight on the left and right sole in the posture that was asked for last."""
         self.torque(robot.postures["stand"], np.array([1.0, 0.0, 0.0, 0.0]), "D")  # compiles: no command waits for it
 
     def torque(self, q: Array, base_quat: Array, support: str) -> Array:
@@ -45,7 +47,7 @@ class GravityCompensation:
         center_of_mass(robot.tree, self._pos, self._rot, self._com)
         for side, foot in enumerate(self._feet):
             self._sole[side] = self._pos[foot + 1] + self._rot[foot + 1] @ self.sole_offset[side]
-        share = share_of_weight(self._com, self._sole, up, support)
+        share = self.share = share_of_weight(self._com, self._sole, up, support)
         _stance_torque(
             robot.tree, self._pos, self._rot, self._com, up, self._feet, self._sole, share, self._moment, self._torque
         )

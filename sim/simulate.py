@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
@@ -22,8 +23,9 @@ from naoimitate.sim.settings import SimSettings
 
 DEFAULT = SimSettings()
 
-SETTLE_TIME = 1.0
-"""How long the robot stands in its first pose before the motion starts, s: servos and soles reach equilibrium."""
+SETTLE_TIME, STAND_TIME = 1.0, 3.0
+"""s for which the robot settles in its first pose, so that servos and soles reach equilibrium, and then stands there
+before the motion starts: closed loops get to know their servos, as on a robot that waits for its operator."""
 
 
 @dataclass(frozen=True)
@@ -126,14 +128,19 @@ def _play(
     sensors = NoisySensors(physics, disturbance)
     duration = float(moments[-1])
     line = CommandLine(disturbance.delay, disturbance.drop_at * duration, disturbance.drop_time)
-    for target, moment, opening in zip(plan, moments.tolist(), openings, strict=True):
+    period = float(np.median(np.diff(moments))) if len(moments) > 1 else STAND_TIME
+    before = (np.arange(-round(STAND_TIME / period), 0) * period).tolist()
+    start = SETTLE_TIME - min(before, default=0.0)
+    frames = zip(plan, moments.tolist(), openings, strict=True)
+    for target, moment, opening in chain(((plan[0], early, openings[0]) for early in before), frames):
         servos = line.through(moment, control(target, sensors.read(target.base_pos, target.base_quat)))
-        now, due = physics.time, moment + SETTLE_TIME
-        physics.push(disturbance.push_force(now - SETTLE_TIME, due - SETTLE_TIME, duration))
+        now, due = physics.time, moment + start
+        physics.push(disturbance.push_force(now - start, due - start, duration))
         if ground is not None:
-            set_heights(physics.model, physics.data, ground(now - SETTLE_TIME))
+            set_heights(physics.model, physics.data, ground(now - start))
         physics.advance(servos, due - now, opening)
-        yield target
+        if moment >= 0.0:
+            yield target
 
 
 def _tipped(physics: Physics, target: Target) -> bool:
