@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from naoimitate.balance.leg_rows import load_rows, sway_rows
+from naoimitate.balance.leg_rows import SLACKS, load_rows, sway_rows
 from naoimitate.balance.legs import POSE, LegLimits, Stance, build_legs, free_goal
 from naoimitate.balance.tangent import differentiate, make_tangent, place
 from naoimitate.core.geometry import quat_from_matrix
@@ -47,7 +47,7 @@ class Scene:
         """Levers (2 M,) m of the loaded joints, and the rows (2 M, n)."""
         self.at(q)
         n, count = len(self.legs.joints), 2 * self.legs.loaded.size
-        C, b = np.zeros((count + 1, n + 3)), np.zeros(count + 1)
+        C, b = np.zeros((count + 1, n + SLACKS)), np.zeros(count + 1)
         most = np.full(self.legs.holds.shape, 1.0)
         load_rows(self.robot.tree, self.legs, self.goal, self.tangent, 1.0, most, C, b, 0)
         return -1.0 - b[:count:2], C[:count:2, :n]
@@ -90,7 +90,8 @@ def test_rows_of_sway_are_the_momentum_of_all_links(robot: RobotModel, seed: int
     scene = Scene(robot, seed, (1.0, 0.0))
     n, m = len(scene.legs.joints), robot.tree.mass / robot.tree.mass.sum()
     scene.at(scene.q)
-    C, b = np.zeros((17, n + 3)), np.zeros(17)
+    rows = 2 * 8 + 2  # two bounds on each of eight ways, and a slack of at least zero for torso and momentum
+    C, b = np.zeros((rows, n + SLACKS)), np.zeros(rows)
     sway_rows(scene.legs, scene.goal, scene.tangent, np.zeros(n), C, b, 0)
     here = scene.links(scene.q)
     for v in range(n):

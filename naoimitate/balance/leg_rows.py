@@ -28,6 +28,7 @@ TABLE_RATE = 8.0
 stops the whole body."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
+SLACKS = 4
 LOAD, SMOOTH, TORSO, MOMENTUM = -4, -3, -2, -1
 """Columns of the slacks. The torso has its own: a jolt of a milliradian must not excuse centimetres of the ZMP."""
 TURN_SCALE = 5.0

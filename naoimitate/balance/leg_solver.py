@@ -18,6 +18,7 @@ import numpy.typing as npt
 from numba import njit
 
 from naoimitate.balance.leg_rows import (
+    SLACKS,
     com_rows,
     count_rows,
     extra_rows,
@@ -51,8 +52,6 @@ class Solution(NamedTuple):
     load: float
 
 
-SLACKS = 4
-"""Of load, smoothness, the torso and the momentum: the last columns, as in ``leg_rows``."""
 CONVERGED = 3e-4
 """[rad] of a step, below which the next one would be as small as its square."""
 CLOSED = 1e-8
