@@ -40,6 +40,9 @@ class HeightSettings:
     """Load, averaged over ``averaged``, that such a sole may carry."""
     averaged: float = 0.05
     """[s]"""
+    spare: float = 0.001
+    """[m] that a sole in the air keeps above its plan for each nominal sag by which the servos hang deeper: a body that
+    sways on soft servos sets it down before its time."""
     landed: float = 0.5
     """[s] that a sole has been down before it can be about to leave."""
 
@@ -56,12 +59,12 @@ class SoleHeights:
         self.raised = np.zeros(2)
         """[m] of the left and the right sole now."""
 
-    def update(self, support: str, share: Array, load: Array | None, steady: bool) -> None:
+    def update(self, support: str, share: Array, load: Array | None, steady: bool, softness: float = 1.0) -> None:
         """Go on by a period.
 
         share: (2,) of the weight that the plan puts on the left and the right sole; load: (2,) that they carry, None
         where nothing is known and heights fade; steady: whether the CoM is where the plan has it, so that no sole is
-        needed for more than the plan says.
+        needed for more than the plan says; softness: how many times as soft as nominal the servos are.
         """
         s = self._s
         rate = np.clip(-self.raised / self._period, -s.lowering, s.lowering)
@@ -73,6 +76,9 @@ class SoleHeights:
                 self._down[i] = 0.0 if air else self._down[i] + self._period
                 if air and load[i] > s.loaded:
                     rate[i] = s.raising
+                elif air:
+                    missing = s.spare * max(softness - 1.0, 0.0) - self.raised[i]
+                    rate[i] = min(max(missing / self._period, -s.lowering), s.easing)
                 elif self._down[i] > s.landed and share[i] < s.idle and steady:
                     rate[i] = s.easing if self._load[i] > s.eased else 0.0
                 elif share[i] > s.due and load[i] < s.unloaded:

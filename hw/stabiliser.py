@@ -141,7 +141,7 @@ class Stabiliser:
         load = state.fsr.sum(axis=1) / self._weight
         known = sway is not None and bool(np.isfinite(load).all())
         steady = sway is not None and bool(np.abs(sway.place).max() < s.steady)
-        self._heights.update(target.support, share, load if known else None, steady)
+        self._heights.update(target.support, share, load if known else None, steady, self._softness())
 
     def _error(self, target: Target, state: RobotState) -> Sway | None:
         """How far the CoM is from where it should be; None where that is not known."""
