@@ -65,7 +65,7 @@ def walked(name: str, stiffness: float, noise: float, blind: Blind = lambda stat
     plan = (run.time, run.q, run.base_pos, run.base_quat, run.support)
     world = Disturbance(stiffness=stiffness, noise=noise, seed=seed)
     result = simulate(NAO, *plan, disturbance=world, control=control)
-    told = places[1:]  # a state is read where the frame before it ended
+    told = places[-len(result.time) + 1 :]  # after the stand; a state is read where the frame before it ended
     assert result.survived and all(place.known for place in told)
     quats = zip([place.quat for place in told], result.base_quat[:-1], strict=True)
     axes = [(matrix_from_quat(quat), matrix_from_quat(true)) for quat, true in quats]
