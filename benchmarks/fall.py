@@ -104,6 +104,7 @@ def _load(model: mujoco.MjModel, data: mujoco.MjData, head: set[int]) -> float:
 
 
 def main() -> None:
+    """Print a line for every direction and response: how hard the head lands after pushes of growing force."""
     robot = load_robot("nao", "v4")
     gate, command = CommandGate(robot), stand(robot)
     for name, degrees in DIRECTIONS.items():

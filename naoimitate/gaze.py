@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +36,21 @@ NEAREST = 1e-3
 """[m] of a hand from the eye, below which its direction means nothing."""
 
 
+class Neck(NamedTuple):
+    """The head's joints, flat for compiled code.
+
+    joints: (H,). lower, upper: (H,) rad. table: (K, 3) rad, rows of their coupling table, none without one; x, y: the
+    joints that it couples.
+    """
+
+    joints: Indices
+    lower: Array
+    upper: Array
+    table: Array
+    x: int
+    y: int
+
+
 class Gaze:
     """Aims the optical axis of the robot's first camera at a hand; without cameras, the x axis of the head link.
 
@@ -44,12 +60,10 @@ class Gaze:
 
     def __init__(self, robot: RobotModel, hand: str, reserve: float) -> None:
         self._tree, self._hand = robot.tree, robot.points[hand]
-        self._head = np.array(robot.chains.get("head", ()), dtype=np.int64)
         self._eye, self.at, self.axis = _eye(robot)
-        self._lower, self._upper = robot.lower[self._head] + reserve, robot.upper[self._head] - reserve
-        stand = np.clip(robot.postures["stand"][self._head], self._lower, self._upper)
-        self._starts = [stand, *map(np.array, product(*np.linspace(self._lower, self._upper, 3).T))]
-        self._table = _table(robot, self._head, reserve)
+        neck = self._neck = _neck(robot, reserve)
+        stand = np.clip(robot.postures["stand"][neck.joints], neck.lower, neck.upper)
+        self._starts = [stand, *map(np.array, product(*np.linspace(neck.lower, neck.upper, 3).T))]
 
     def angles(self, q: Array) -> Array:
         """Angles (H,) rad of the head's joints that look at the hand, for a robot at q (J,) rad.
@@ -58,24 +72,23 @@ class Gaze:
         The search starts from where the head is, and then from the posture ``stand``, the middle, sides and corners of
         its range, for a table has narrow places and a range has ends behind which something nearer may be.
         """
-        best = q.copy()
-        if not self._head.size:
-            return best[self._head]
+        best, joints = q.copy(), self._neck.joints
+        if not joints.size:
+            return best[joints]
         least = self._search(best)
         for start in self._starts:
             if least < ON_IT:
                 break
             other = q.copy()
-            other[self._head] = start
+            other[joints] = start
             miss = self._search(other)
             if miss < least - TURN_BACK:
                 best, least = other, miss
-        return best[self._head]
+        return best[joints]
 
     def _search(self, q: Array) -> float:
         """Turn the head of q (J,) rad to the nearest direction there is around; the angle (rad) that is left."""
-        hand, eye = (self._hand.joint, self._hand.offset), (self._eye, self.at, self.axis)
-        _aim(self._tree, self._head, q, *eye, *hand, self._lower, self._upper, *self._table)
+        _aim(self._tree, self._neck, q, self._eye, self.at, self.axis, self._hand.joint, self._hand.offset)
         return self.miss(q)
 
     def miss(self, q: Array) -> float:
@@ -105,71 +118,50 @@ def _eye(robot: RobotModel) -> tuple[int, Array, Array]:
     return frame.joint, np.ascontiguousarray(place), np.ascontiguousarray(axis)
 
 
-def _table(robot: RobotModel, head: Indices, reserve: float) -> tuple[Array, int, int]:
-    """Rows (K, 3) rad of the head's coupling table less the reserve, and which joints are x and y; no rows for none."""
-    table: CouplingTable | None = next((t for t in robot.tables if t.y in head), None)
+def _neck(robot: RobotModel, reserve: float) -> Neck:
+    """The head's joints, with their limits and their coupling table less the reserve."""
+    joints = np.array(robot.chains.get("head", ()), dtype=np.int64)
+    lower, upper = robot.lower[joints] + reserve, robot.upper[joints] - reserve
+    table: CouplingTable | None = next((t for t in robot.tables if t.y in joints), None)
     if table is None:
-        return np.zeros((0, 3)), 0, 0
-    return np.ascontiguousarray(table.rows + np.array([0.0, reserve, -reserve])), table.x, table.y
+        return Neck(joints, lower, upper, np.zeros((0, 3)), 0, 0)
+    rows = np.ascontiguousarray(table.rows + np.array([0.0, reserve, -reserve]))
+    return Neck(joints, lower, upper, rows, table.x, table.y)
 
 
 @njit(cache=True)
-def _aim(
-    tree: Tree,
-    head: Indices,
-    q: Array,
-    eye: int,
-    at: Array,
-    axis: Array,
-    hand: int,
-    offset: Array,
-    lower: Array,
-    upper: Array,
-    table: Array,
-    table_x: int,
-    table_y: int,
-) -> None:
+def _aim(tree: Tree, neck: Neck, q: Array, eye: int, at: Array, axis: Array, hand: int, offset: Array) -> None:
     """Turn the head's joints of q (J,) rad until the axis a points along d, from the eye to the hand.
 
-    Damped Gauss-Newton on |d - a|^2, with limits (H,) rad and the table linearised at every step; a step that leads
-    away is taken again with more damping.
+    Damped Gauss-Newton on |d - a|^2, with the limits, and the table linearised at every step; a step that leads away is
+    taken again with more damping.
     """
-    n, joints = head.shape[0], q.shape[0]
+    head, n, joints = neck.joints, neck.joints.shape[0], q.shape[0]
     pos, rot = np.empty((joints + 1, 3)), np.empty((joints + 1, 3, 3))
     J, step, best, least, damping = np.empty((3, n)), np.zeros(n), q[head], np.inf, DAMPING
-    H, g, (C, b) = np.eye(n), np.zeros(n), _room(head, q, lower, upper, table, table_x, table_y)
+    H, g, (C, b) = np.eye(n), np.zeros(n), _room(neck, q)
     for _ in range(STEPS):
-        _move(head, q, best, step, lower, upper, table, table_x, table_y)
+        _move(neck, q, best, step)
         forward(tree, q, pos, rot)
         there = pos[hand + 1] + rot[hand + 1] @ offset
         error = _linearise(tree, head, pos, rot, eye, at, axis, there, J)
         damping *= LESS if (error**2).sum() < least else MORE
         if (error**2).sum() < least:
             least, best, damping = (error**2).sum(), q[head], max(damping, DAMPING)
-            H, g, (C, b) = J.T @ J, J.T @ error, _room(head, q, lower, upper, table, table_x, table_y)
+            H, g, (C, b) = J.T @ J, J.T @ error, _room(neck, q)
         if bounded_step(H + damping * damping * np.eye(n), g, C, b, 0, step) != SOLVED or np.abs(step).max() < ENOUGH:
             break
     q[head] = best
 
 
 @njit(cache=True)
-def _move(
-    head: Indices,
-    q: Array,
-    here: Array,
-    step: Array,
-    lower: Array,
-    upper: Array,
-    table: Array,
-    table_x: int,
-    table_y: int,
-) -> None:
+def _move(neck: Neck, q: Array, here: Array, step: Array) -> None:
     """Put the head's joints of q (J,) rad a step (H,) rad from here (H,) rad, within limits and table."""
-    for i in range(head.shape[0]):
-        q[head[i]] = min(max(here[i] + step[i], lower[i]), upper[i])
-    if table.shape[0]:
-        low, _, high, _ = table_bounds(table, q[table_x])
-        q[table_y] = min(max(q[table_y], low), high)
+    for i in range(neck.joints.shape[0]):
+        q[neck.joints[i]] = min(max(here[i] + step[i], neck.lower[i]), neck.upper[i])
+    if neck.table.shape[0]:
+        low, _, high, _ = table_bounds(neck.table, q[neck.x])
+        q[neck.y] = min(max(q[neck.y], low), high)
 
 
 @njit(cache=True)
@@ -193,24 +185,23 @@ def _linearise(
 
 
 @njit(cache=True)
-def _room(
-    head: Indices, q: Array, lower: Array, upper: Array, table: Array, table_x: int, table_y: int
-) -> tuple[Array, Array]:
+def _room(neck: Neck, q: Array) -> tuple[Array, Array]:
     """Rows C (K, H) and b (K,) rad of C step >= b: the head's limits, and the table's edges at q (J,) rad."""
-    n = head.shape[0]
+    n = neck.joints.shape[0]
     C, b = np.zeros((2 * n + 2, n)), np.zeros(2 * n + 2)
     for i in range(n):
+        angle = q[neck.joints[i]]
         C[i, i], C[n + i, i] = 1.0, -1.0
-        b[i], b[n + i] = min(lower[i] - q[head[i]], 0.0), min(q[head[i]] - upper[i], 0.0)
-    if table.shape[0] == 0:
+        b[i], b[n + i] = min(neck.lower[i] - angle, 0.0), min(angle - neck.upper[i], 0.0)
+    if neck.table.shape[0] == 0:
         return C[: 2 * n], b[: 2 * n]
-    low, low_slope, high, high_slope = table_bounds(table, q[table_x])
+    low, low_slope, high, high_slope = table_bounds(neck.table, q[neck.x])
     for i in range(n):
-        if head[i] == table_y:
+        if neck.joints[i] == neck.y:
             C[2 * n, i] += 1.0
             C[2 * n + 1, i] -= 1.0
-        elif head[i] == table_x:
+        elif neck.joints[i] == neck.x:
             C[2 * n, i] -= low_slope
             C[2 * n + 1, i] += high_slope
-    b[2 * n], b[2 * n + 1] = min(low - q[table_y], 0.0), min(q[table_y] - high, 0.0)
+    b[2 * n], b[2 * n + 1] = min(low - q[neck.y], 0.0), min(q[neck.y] - high, 0.0)
     return C, b

@@ -128,11 +128,10 @@ def _play(
     sensors = NoisySensors(physics, disturbance)
     duration = float(moments[-1])
     line = CommandLine(disturbance.delay, disturbance.drop_at * duration, disturbance.drop_time)
-    period = float(np.median(np.diff(moments))) if len(moments) > 1 else STAND_TIME
-    before = (np.arange(-round(STAND_TIME / period), 0) * period).tolist()
-    start = SETTLE_TIME - min(before, default=0.0)
-    frames = zip(plan, moments.tolist(), openings, strict=True)
-    for target, moment, opening in chain(((plan[0], early, openings[0]) for early in before), frames):
+    early = _before(moments)
+    start = SETTLE_TIME - min(early, default=0.0)
+    stand = ((plan[0], moment, openings[0]) for moment in early)
+    for target, moment, opening in chain(stand, zip(plan, moments.tolist(), openings, strict=True)):
         servos = line.through(moment, control(target, sensors.read(target.base_pos, target.base_quat)))
         now, due = physics.time, moment + start
         physics.push(disturbance.push_force(now - start, due - start, duration))
@@ -141,6 +140,12 @@ def _play(
         physics.advance(servos, due - now, opening)
         if moment >= 0.0:
             yield target
+
+
+def _before(moments: Array) -> list[float]:
+    """Moments (s) before the first frame at which a robot that stands there is sent it, as often as the others."""
+    period = float(np.median(np.diff(moments))) if len(moments) > 1 else STAND_TIME
+    return [-period * count for count in range(round(STAND_TIME / period), 0, -1)]
 
 
 def _tipped(physics: Physics, target: Target) -> bool:

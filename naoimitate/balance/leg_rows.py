@@ -29,10 +29,11 @@ stops the whole body."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
 SLACKS = 4
+"""How many slacks there are..."""
 LOAD, SMOOTH, TORSO, MOMENTUM = -4, -3, -2, -1
-"""Columns of the slacks. The torso has its own: a jolt of a milliradian must not excuse centimetres of the ZMP."""
+"""...and their columns. The torso has its own: a jolt of a milliradian must not excuse centimetres of the ZMP."""
 TURN_SCALE = 5.0
-"""[m/rad] of the torso's turn: how that and its way share their slack."""
+"""[rad/m] How the torso's turn and its way share their slack: a radian counts as a fifth of a metre."""
 
 
 @njit(cache=True)

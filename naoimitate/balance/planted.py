@@ -93,21 +93,21 @@ class Planted:
             if closed and self._gate.passes(candidate, pose, stances, stride.planted_pos, stride.planted_rot, reach.dt):
                 stride.accept(plan, scale, candidate, reach.dt)
                 self._sway.accept(pose, candidate, reach.dt)
-                hurry, end = self._pace(pose.q, candidate.q, reach.dt)
-                self._body = Body(self._sway.calm, self._sway.steady, hurry, load, end)
+                self._body = self._moved(pose.q, candidate.q, load, reach.dt)
                 return Answer(candidate, given_up, iterations)
         stride.hold()
         self._sway.rest()
         self._body = Body()
         return Answer(pose, given_up | GivenUp.HOLD, iterations)
 
-    def _pace(self, before: Array, q: Array, dt: float) -> tuple[float, float]:
-        """``speed`` and ``end`` of ``Body`` after a step of dt s from joint angles (J,) rad to others."""
+    def _moved(self, before: Array, q: Array, load: float, dt: float) -> Body:
+        """What a step of dt s from joint angles (J,) rad to others, with a ``load``, has made of the body."""
         legs = self._legs
-        speed = (q - before)[legs.joints] / dt
-        left = np.where(speed > 0.0, legs.upper[legs.joints] - q[legs.joints], q[legs.joints] - legs.lower[legs.joints])
+        speed, here = (q - before)[legs.joints] / dt, q[legs.joints]
+        left = np.where(speed > 0.0, legs.upper[legs.joints] - here, here - legs.lower[legs.joints])
         end = np.where(np.abs(speed) > SLOW, np.maximum(left, 0.0) / np.maximum(np.abs(speed), SLOW), np.inf)
-        return float((np.abs(speed) / self._speed[legs.joints]).max()), float(end.min())
+        used = float((np.abs(speed) / self._speed[legs.joints]).max())
+        return Body(self._sway.calm, self._sway.steady, used, load, float(end.min()))
 
     def _solve(
         self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach

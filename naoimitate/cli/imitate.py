@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from naoimitate.cli import types
+from naoimitate.cli.method import head_option, robot_options, shift_option
 from naoimitate.cli.source import motion_options, read_motion
 
 if TYPE_CHECKING:
@@ -18,16 +19,9 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("motion")
 @click.option("--out", type=types.RUN_FILE, required=True, help="Run file to write.")
-@click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
-@click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
+@robot_options
 @click.option("--method", type=click.Choice(["static"]), default="static", show_default=True, help="How to imitate.")
-@click.option(
-    "--shift",
-    type=click.Choice(["pendulum", "parabola"]),
-    default="pendulum",
-    show_default=True,
-    help="How the weight goes from foot to foot: as fast as balance allows, or by the paper's speed law.",
-)
+@shift_option
 @click.option(
     "--retarget",
     type=click.Choice(["planted", "paper", "direct"]),
@@ -51,13 +45,7 @@ if TYPE_CHECKING:
     show_default=True,
     help="How the hands turn.",
 )
-@click.option(
-    "--head",
-    type=click.Choice(["follow", "left-hand", "right-hand"]),
-    default="follow",
-    show_default=True,
-    help="The head follows the person's, or looks at a hand of the robot.",
-)
+@head_option
 @click.option("--mirror", is_flag=True, help="The robot is the person's mirror image.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Of everything random.")
 @click.option(

@@ -11,6 +11,7 @@ import click
 
 from naoimitate.cli import types
 from naoimitate.cli.conduct import Rig, conduct
+from naoimitate.cli.method import head_option, robot_options, shift_option
 
 if TYPE_CHECKING:
     from naoimitate.hw.driver import Driver
@@ -33,23 +34,10 @@ FEELING = ("mujoco", "naoqi")
 @click.option("--can-channel", default="can0", show_default=True, help="Of the CAN bus.")
 @click.option("--can-codec", type=click.Choice(["dbc"]), default="dbc", show_default=True, help="What motors speak.")
 @click.option("--url", default="tcp://nao.local:9559", show_default=True, help="Of a real NAO, for --driver naoqi.")
-@click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
-@click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
+@robot_options
 @click.option("--mirror", is_flag=True, help="The operator faces the robot: left and right are exchanged.")
-@click.option(
-    "--head",
-    type=click.Choice(["follow", "left-hand", "right-hand"]),
-    default="follow",
-    show_default=True,
-    help="The head follows the operator's, or looks at a hand of the robot.",
-)
-@click.option(
-    "--shift",
-    type=click.Choice(["pendulum", "parabola"]),
-    default="pendulum",
-    show_default=True,
-    help="How the weight goes from foot to foot: as fast as balance allows, or by the paper's speed law.",
-)
+@head_option
+@shift_option
 @click.option("--upper-body", is_flag=True, help="The robot stands, and imitates arms and head only.")
 @click.option("--no-filter", is_flag=True, help="Use landmarks as they come.")
 @click.option(

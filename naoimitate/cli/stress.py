@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from naoimitate.cli import types
+from naoimitate.cli.method import robot_options
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -44,8 +45,7 @@ WIDTH = 120
 )
 @click.option("--feedback", is_flag=True, help="The driver learns its servos and balances by its sensors.")
 @click.option("--speed", type=types.FACTOR_OR_AUTO, default=1.0, show_default=True, help="As in imitate.")
-@click.option("--robot", default="nao", show_default=True, help="A built-in robot, or a folder with one.")
-@click.option("--robot-version", metavar="VERSION", help="Version of the robot [default: v4 for nao].")
+@robot_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object with every draw.")
 @click.option("--check", is_flag=True, help="Exit with 1 when the robot fell.")
 def stress(motions: tuple[str, ...], as_json: bool, check: bool, **options: Any) -> None:
