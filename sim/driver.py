@@ -29,7 +29,7 @@ class MujocoDriver:
 
     real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
     otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity; learning: for the
-    stiffness that the servos show, not just that of the settings; balance: with the loops of ``hw.feedback``. scene:
+    stiffness that the servos show, not just that of the settings; balance: all loops of ``hw.feedback``. scene:
     adds objects to the robot's world. The hands are closed until a command opens them.
     """
 
@@ -125,8 +125,8 @@ class MujocoDriver:
     def _closed(self) -> ServoCommand:
         """What is added to a target, new for each connection: loops remember the robot's clock and its servos."""
         (compensation, learning, balance), stiffness = self._loops, self._settings.stiffness
-        if compensation and learning and balance:
-            return feedback(self._robot, stiffness, self.period)
+        if balance:
+            return feedback(self._robot, stiffness if compensation else None, self.period)
         if compensation and learning:
             return LearningCompensation(self._robot, stiffness, self.period)
         return servo_command(self._robot, stiffness if compensation else None)
