@@ -9,6 +9,7 @@ import pytest
 
 from naoimitate.balance.leg_solver import solve_legs
 from naoimitate.balance.legs import (
+    DOWN,
     FREE,
     POSE,
     LegGoal,
@@ -258,6 +259,41 @@ def test_a_free_sole_swings_to_its_target_and_not_below_its_height(robot: RobotM
         body.solve(body.goal(down, 1.0), FREE, 0.01)
         outline = body.pose.sole_pos[0] + body.legs.outline[0] @ body.pose.sole_rot[0][:, :2].T
         assert outline[:, 2].min() >= 0.01 - 2e-4
+
+
+def lifted(robot: RobotModel, height: float) -> Body:
+    """A body on its right sole, the other one level at a height in m, still asked for where it stood."""
+    body = Body(robot, side=1)
+    for k in range(80):
+        body.soles[0][2] = height * min(k / 40.0, 1.0)
+        body.solve(body.goal(body.feet, 0.5 + 0.5 * min(k / 40.0, 1.0)))
+    body.soles = body.soles.copy()
+    body.soles[0][2] -= 1e-3
+    return body
+
+
+def test_a_foot_comes_down_exactly_as_asked_while_the_body_may_move(robot: RobotModel) -> None:
+    body = lifted(robot, 0.02)
+    _, closure, _ = body.solve(body.goal(body.feet, 1.0), DOWN)
+    assert closure < CLOSED
+    assert body.pose.sole_pos[0] == pytest.approx(body.soles[0], abs=1e-8)
+
+
+def test_a_foot_stays_higher_where_the_body_would_have_to_jump(robot: RobotModel) -> None:
+    """The leg is stiff and the torso may not move: the foot does not get its millimetre down."""
+    body = lifted(robot, 0.02)
+    goal, leg = body.goal(body.feet, 1.0), body.legs.variable[list(robot.chains["l_leg"])]
+    rows = np.zeros((2 * len(leg), len(body.legs.joints)))
+    rows[np.arange(len(leg)), leg], rows[len(leg) + np.arange(len(leg)), leg] = 1.0, -1.0
+    stiff = (rows, np.full(2 * len(leg), -2e-5))
+    low, high = goal.sway_low.copy(), goal.sway_high.copy()
+    low[2:], high[2:] = -2e-5, 2e-5
+    before = body.pose
+    done, closure, _ = body.solve(goal._replace(sway_low=low, sway_high=high), DOWN, rows=stiff)
+    assert done > 0
+    assert closure < 1e-4
+    assert body.soles[0][2] + 5e-4 < body.pose.sole_pos[0][2] <= before.sole_pos[0][2] + 1e-4
+    assert np.linalg.norm(body.pose.base_pos - before.base_pos) < 1e-4
 
 
 def test_table_bounds_are_those_of_the_coupling_table(nao: RobotModel) -> None:

@@ -219,3 +219,20 @@ def test_a_foot_that_is_refused_on_its_way_down_goes_up_again_and_gives_way() ->
     assert foot.swing.lateness == 1.0
     foot.step(False)
     assert foot.swing.lateness == 0.0
+
+
+def test_a_foot_that_comes_down_less_than_asked_is_asked_for_less_and_goes_up_again() -> None:
+    """Its leg stops it 3 mm over the floor."""
+    foot = Foot(0.01)
+    foot.until(False, Phase.FREE)
+    foot.until(True, Phase.DESCEND)
+    asked = []
+    while foot.swing.phase is Phase.DESCEND:
+        foot.position[2] = max(foot.position[2], 0.003)
+        asked.append(foot.position[2])
+        foot.step(True)
+        asked[-1] -= foot.position[2]
+        assert not foot.down
+        assert foot.time < 10.0
+    assert foot.swing.phase is Phase.APPROACH
+    assert 0.0 <= asked[-2] <= S.descend_acceleration * foot.dt**2 + 1e-12

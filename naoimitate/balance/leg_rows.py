@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from naoimitate.balance.legs import POSE, LegGoal, Legs, Stance, reduce_columns, table_bounds
+from naoimitate.balance.legs import DOWN, POSE, LegGoal, Legs, Stance, reduce_columns, table_bounds
 from naoimitate.balance.retarget import Reach
 from naoimitate.balance.sway import turned
 from naoimitate.balance.tangent import Tangent, beyond, cross, over_floor, turn_columns
@@ -28,28 +28,52 @@ TABLE_RATE = 8.0
 stops the whole body."""
 TABLE_RESERVE = 5e-4
 """[rad] kept from the coupling tables."""
-SLACKS = 4
+SLACKS = 5
 """How many slacks there are..."""
-LOAD, SMOOTH, TORSO, MOMENTUM = -4, -3, -2, -1
+LOAD, SMOOTH, TORSO, MOMENTUM, DESCENT = -5, -4, -3, -2, -1
 """...and their columns. The torso has its own: a jolt of a milliradian must not excuse centimetres of the ZMP."""
 TURN_SCALE = 5.0
 """[rad/m] How the torso's turn and its way share their slack: a radian counts as a fifth of a metre."""
 
 
 @njit(cache=True)
+def sole_rows(
+    legs: Legs, stance: Stance, t: Tangent, e_pos: Array, e_rot: Array, C: Array, b: Array
+) -> tuple[int, int]:
+    """Where the other sole is to be, errors (3,) m and (3,) rad in the world; (the next row, how many are equalities).
+
+    The equalities come first.
+    """
+    if stance.kind == POSE:
+        return pose_rows(t, e_pos, e_rot, C, b), 6
+    if stance.kind == DOWN:
+        return down_rows(t, e_pos, e_rot, C, b), 5
+    return height_rows(legs, stance, t, C, b), 0
+
+
+@njit(cache=True)
 def pose_rows(t: Tangent, e_pos: Array, e_rot: Array, C: Array, b: Array) -> int:
-    """The other sole's pose as the first six rows, equalities; errors (3,) m and (3,) rad in the world."""
+    """The other sole turns and goes exactly where it is asked to, its height last."""
     n = t.at.shape[1]
     for a in range(3):
-        C[a, :n], C[a + 3, :n] = t.other_world[a], t.other_world_turn[a]
-        b[a], b[a + 3] = e_pos[a], e_rot[a]
+        C[a, :n], C[a + 3, :n] = t.other_world_turn[a], t.other_world[a]
+        b[a], b[a + 3] = e_rot[a], e_pos[a]
     return 6
 
 
 @njit(cache=True)
-def height_rows(legs: Legs, stance: Stance, t: Tangent, C: Array, b: Array, row: int) -> int:
+def down_rows(t: Tangent, e_pos: Array, e_rot: Array, C: Array, b: Array) -> int:
+    """The same, but the sole may stay higher, for a price."""
+    row = pose_rows(t, e_pos, e_rot, C, b)
+    C[row], b[row] = -C[row - 1], -b[row - 1]
+    C[row, DESCENT], C[row + 1, DESCENT], b[row + 1] = 1.0, 1.0, 0.0
+    return row + 2
+
+
+@njit(cache=True)
+def height_rows(legs: Legs, stance: Stance, t: Tangent, C: Array, b: Array) -> int:
     """No outline point of the other sole below ``min_height``."""
-    o = 1 - stance.side
+    o, row = 1 - stance.side, 0
     height = t.p[2] + t.R[2, 0] * t.other_at[0] + t.R[2, 1] * t.other_at[1] + t.R[2, 2] * t.other_at[2]
     for k in range(legs.outline.shape[1]):
         x, y = legs.outline[o, k, 0], legs.outline[o, k, 1]
@@ -247,7 +271,7 @@ def _both_ways(C: Array, b: Array, row: int, low: float, high: float) -> int:
 
 
 @njit(cache=True)
-def count_rows(legs: Legs, stance: Stance, extra: int) -> int:
+def count_rows(legs: Legs, extra: int) -> int:
     """Rows that all these functions write at most."""
-    other = 6 if stance.kind == POSE else legs.outline.shape[1]
+    other = max(8, legs.outline.shape[1])
     return other + 4 + 2 * legs.loaded.size + 1 + 18 + 4 * legs.joints.shape[0] + 1 + 4 * legs.table_x.shape[0] + extra

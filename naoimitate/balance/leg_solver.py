@@ -22,14 +22,13 @@ from naoimitate.balance.leg_rows import (
     com_rows,
     count_rows,
     extra_rows,
-    height_rows,
     joint_rows,
     load_rows,
-    pose_rows,
+    sole_rows,
     sway_rows,
     table_rows,
 )
-from naoimitate.balance.legs import POSE, REACH, LegGoal, Legs, LegWeights, Stance
+from naoimitate.balance.legs import DOWN, FREE, POSE, REACH, LegGoal, Legs, LegWeights, Stance
 from naoimitate.balance.retarget import Reach
 from naoimitate.balance.tangent import Tangent, add_turned, differentiate, make_tangent, place
 from naoimitate.core.geometry import rotation_vector
@@ -81,7 +80,7 @@ def solve_legs(
     start, moved = np.array([q[j] for j in legs.joints]), np.zeros(n)
     e_pos, e_rot, e_com, slack, most = np.empty(3), np.empty(3), np.empty(2), np.empty(2), np.zeros(legs.holds.shape)
     H, g = np.empty((n + SLACKS, n + SLACKS)), np.empty(n + SLACKS)
-    C = np.zeros((count_rows(legs, stance, rows.shape[0]), n + SLACKS))
+    C = np.zeros((count_rows(legs, rows.shape[0]), n + SLACKS))
     b = np.empty(C.shape[0])
     closure, com_error, load = 0.0, 0.0, 0.0
     limit, damping, done = int(weights.iterations), weights.damping, 0
@@ -89,7 +88,7 @@ def solve_legs(
         place(tree, legs, stance, q, t)
         _errors(stance, goal, t, e_pos, e_rot, e_com)
         com_error = np.sqrt(e_com[0] ** 2 + e_com[1] ** 2)
-        closure = np.abs(e_pos).sum() + np.abs(e_rot).sum() if stance.kind == POSE else 0.0
+        closure = _closure(stance, e_pos, e_rot)
         if iteration == limit or (iteration > 0 and np.abs(x[:n]).max() < CONVERGED and closure < CLOSED):
             break
         if iteration == 0:
@@ -99,14 +98,14 @@ def solve_legs(
         differentiate(tree, legs, stance, goal.about, t)
         _tasks(legs, weights, stance, goal, t, q, e_pos, e_rot, e_com, damping, H, g)
         C[:] = 0.0
-        row = pose_rows(t, e_pos, e_rot, C, b) if stance.kind == POSE else height_rows(legs, stance, t, C, b, 0)
+        row, equalities = sole_rows(legs, stance, t, e_pos, e_rot, C, b)
         row = com_rows(t, goal.along, e_com, slack, C, b, row)
         row, load = load_rows(tree, legs, goal, t, reach.dt, most, C, b, row)
         row = sway_rows(legs, goal, t, moved, C, b, row)
         row = joint_rows(legs, q, start, reach, C, b, row)
         row = table_rows(legs, q, reach.dt, C, b, row)
         row = extra_rows(rows, bounds, moved, C, b, row)
-        if _step(H, g, C[:row], b[:row], 6 if stance.kind == POSE else 0, x) != SOLVED:
+        if _step(H, g, C[:row], b[:row], equalities, x) != SOLVED:
             break
         done += 1
         damping *= weights.damping_growth
@@ -149,6 +148,15 @@ def _errors(stance: Stance, goal: LegGoal, t: Tangent, e_pos: Array, e_rot: Arra
 
 
 @njit(cache=True)
+def _closure(stance: Stance, e_pos: Array, e_rot: Array) -> float:
+    """How far the other sole is from where it must be, in m and rad, summed: a foot that comes down may be higher."""
+    if stance.kind not in (POSE, DOWN):
+        return 0.0
+    height = max(e_pos[2], 0.0) if stance.kind == DOWN else abs(e_pos[2])
+    return np.abs(e_pos[:2]).sum() + height + np.abs(e_rot).sum()
+
+
+@njit(cache=True)
 def _tasks(
     legs: Legs,
     weights: LegWeights,
@@ -173,14 +181,14 @@ def _tasks(
     if stance.kind == REACH:
         _add_task(t.other_world, e_pos, weights.reach, H, g)
         _add_task(t.other_world_turn, e_rot, weights.reach_turn, H, g)
-    elif stance.kind != POSE:
+    elif stance.kind == FREE:
         part = min(1.0, weights.secondary_step / max(float(np.linalg.norm(e_rot)), 1e-9))
         _add_task(t.other_world_turn, part * e_rot, weights.level, H, g)
     for i in range(n):
         away = legs.rest[legs.joints[i]] - q[legs.joints[i]]
         H[i, i] += damping * damping + weights.rest**2
         g[i] += weights.rest**2 * min(max(away, -weights.secondary_step), weights.secondary_step)
-    for k, price in enumerate((weights.overload, weights.jerk, weights.torso, weights.momentum)):
+    for k, price in enumerate((weights.overload, weights.jerk, weights.torso, weights.momentum, weights.descent)):
         H[n + k, n + k], g[n + k] = 1.0, -price
 
 

@@ -19,11 +19,13 @@ Ints = npt.NDArray[np.int64]
 
 
 POSE = 0
-"""The other sole follows a given pose exactly: planted, lifting, coming down."""
+"""The other sole follows a given pose exactly: planted, lifting."""
 FREE = 1
 """The other sole swings: its place in the torso frame and its level are tasks, its height a bound."""
 REACH = 2
 """The other sole makes for a pose in the world, around whatever is in its way; its height is a bound."""
+DOWN = 3
+"""The other sole comes down: it follows a given pose exactly, but stays higher where the body would have to jump."""
 
 
 class Legs(NamedTuple):
@@ -74,6 +76,8 @@ class LegWeights(NamedTuple):
     """Price of m of the torso's step beyond the bounds of sway, and..."""
     momentum: float = 3000.0
     """...of m^2 of momentum: so high that only a body that cannot brake in time pays."""
+    descent: float = 100.0
+    """Price of m by which a foot that comes down stays higher than asked."""
     still: float = 0.3
     """Of the torso's own motion over the floor in a frame: it goes no faster than the feet's targets need."""
     still_reaching: float = 2.0
@@ -171,7 +175,8 @@ class Stance(NamedTuple):
     """Where the soles are asked to be, in the world.
 
     side: 0 or 1, the foot on which the base hangs. pos: (2, 3) m, rot: (2, 3, 3): stance sole as it is, other sole as
-    asked. kind: ``POSE``, ``FREE`` or ``REACH``. min_height: m, below which no outline point of a free sole may come.
+    asked. kind: ``POSE``, ``FREE``, ``REACH`` or ``DOWN``. min_height: m, below which no outline point of a free sole
+    may come.
     """
 
     side: int

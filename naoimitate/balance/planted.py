@@ -7,8 +7,9 @@ import numpy.typing as npt
 
 from naoimitate.balance.clearance import Clearance
 from naoimitate.balance.leg_solver import solve_legs
-from naoimitate.balance.legs import FREE, POSE, Legs, LegWeights, Stance, free_goal
+from naoimitate.balance.legs import FREE, POSE, REACH, Legs, LegWeights, Stance, free_goal
 from naoimitate.balance.pose import Pose, PoseMaker
+from naoimitate.balance.range_end import time_to_end
 from naoimitate.balance.retarget import Answer, Footing, Reach
 from naoimitate.balance.stride import Plan, Stride
 from naoimitate.balance.sway import Sway
@@ -36,8 +37,6 @@ PLACE_STEP = 0.1
 """[rad] of each joint in one step of ``place``."""
 PLACE_TIME = 1.0
 """[s] of one step of ``place``: nothing that a frame's time bounds is in its way."""
-SLOW = 0.3
-"""[rad/s] of a joint that is at the end of its range at any time: nothing has to wait for it."""
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
@@ -102,12 +101,9 @@ class Planted:
 
     def _moved(self, before: Array, q: Array, load: float, dt: float) -> Body:
         """What a step of dt s from joint angles (J,) rad to others, with a ``load``, has made of the body."""
-        legs = self._legs
-        speed, here = (q - before)[legs.joints] / dt, q[legs.joints]
-        left = np.where(speed > 0.0, legs.upper[legs.joints] - here, here - legs.lower[legs.joints])
-        end = np.where(np.abs(speed) > SLOW, np.maximum(left, 0.0) / np.maximum(np.abs(speed), SLOW), np.inf)
-        used = float((np.abs(speed) / self._speed[legs.joints]).max())
-        return Body(self._sway.calm, self._sway.steady, used, load, float(end.min()))
+        joints = self._legs.joints
+        used = float((np.abs(q - before)[joints] / (dt * self._speed[joints])).max())
+        return Body(self._sway.calm, self._sway.steady, used, load, time_to_end(self._legs, before, q, dt))
 
     def _solve(
         self, q: Array, plan: Plan, pose: Pose, feet: Array, scale: float, reach: Reach
@@ -134,7 +130,7 @@ class Planted:
         stance = Stance(stride.side, pos, rot, plan.kind, lowest)
         moved = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
         self._clearance.look(moved)
-        rows = self._clearance.leg_rows(moved, self._legs, stride.side, plan.kind != POSE)
+        rows = self._clearance.leg_rows(moved, self._legs, stride.side, plan.kind in (FREE, REACH))
         ground = stride.ground(pose)
         about, low, high = self._sway.bounds(pose, moved, plan.sway, stride.shift(plan), ground, reach.dt)
         goal = goal._replace(about=about, along=ground.along, sway_low=low, sway_high=high)
@@ -144,7 +140,7 @@ class Planted:
             q[:] = start
             found = solve_legs(self._tree, self._legs, weights, stance, wish, q, reach, rows[0], bounds)
             iterations += found.iterations
-            if found.iterations > 0 and (plan.kind != POSE or found.closure < CLOSED):
+            if found.iterations > 0 and found.closure < CLOSED:
                 return iterations, True, found.load
         return iterations, False, 0.0
 

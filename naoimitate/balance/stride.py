@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from naoimitate.balance.landing import LandingSet
-from naoimitate.balance.legs import FREE, POSE, REACH
+from naoimitate.balance.legs import DOWN, FREE, POSE, REACH
 from naoimitate.balance.offset import OffsetLaw, Span, normalised_offset
 from naoimitate.balance.polygon import room_around
 from naoimitate.balance.pose import Pose, PoseMaker
@@ -24,6 +24,8 @@ Array = npt.NDArray[np.float64]
 
 COM_OFF = 0.004
 """[m] by which the CoM may be off its place while a foot comes down: a leg that pulls it along lands elsewhere."""
+TOUCHING = 2e-5
+"""[m] above the place of its touchdown from which a sole counts as there."""
 LEAD = 0.001
 """[m] by which the offset may run ahead of the CoM."""
 ZMP_MARGIN = 0.020
@@ -32,7 +34,7 @@ ZMP_LEAST = 0.003
 """[m] ...and by which it may be off the CoM's projection in any case."""
 ONE_SIDED = 0.1
 """Share of the weight on a foot below which the other one stands alone."""
-_KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: POSE}
+_KINDS = {Phase.LIFT: POSE, Phase.FREE: FREE, Phase.APPROACH: REACH, Phase.DESCEND: DOWN}
 
 
 @dataclass(frozen=True)
@@ -185,7 +187,8 @@ class Stride:
             lead = lead if self._swing is None else 0.0
             offset = min(max(offset, here - lead), here + lead)
         self._weight.move(offset, dt)
-        if plan.touchdown and scale == 1.0:
+        down = pose.sole_pos[1 - self.side][2] <= plan.sole_pos[2] + TOUCHING
+        if plan.touchdown and scale == 1.0 and down:
             foot = 1 - self.side
             self.planted_pos[foot], self.planted_rot[foot] = plan.sole_pos, plan.sole_rot
             self._fsm.step(SupportInput(human="D", offset=self.offset, landed=True))

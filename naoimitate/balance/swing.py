@@ -89,7 +89,7 @@ class Swing:
         self.min_height = 0.0
         self._velocity, self._turning = np.zeros(3), 0.0
         self._waited, self._hovered = 0.0, 0.0
-        self._blocked, self._refused = 0.0, False
+        self._blocked, self._asked, self._refused = 0.0, 0.0, False
         self._before = position.copy()
         self._start = position.copy()
         self._rotation = rotation.copy()
@@ -112,16 +112,22 @@ class Swing:
             self._velocity, self._turning, self._waited = moved / dt, 0.0, 0.0
             return position, yaw_matrix(goal_yaw), False
         if self.phase is Phase.DESCEND:
+            self._sink(-moved[2], dt)
             self._waited += dt if self._blocked > 0.0 else 0.0
             if self._blocked < self.settings.blocked:
                 return self._descend(position, rotation, dt)
             self._blocked, self._hovered, self.min_height = 0.0, 0.0, min(self.min_height, float(position[2]))
         return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
+    def _sink(self, way: float, dt: float) -> None:
+        """The foot came down by ``way`` m in the last dt s; where its leg is in the way, by less than was asked."""
+        if way < 0.5 * self._asked:
+            self._velocity[2], self._refused = -max(way, 0.0) / dt, True
+
     def stop(self) -> None:
         """The last step was not taken: start again from rest."""
         self._velocity[:] = 0.0
-        self._turning, self._refused = 0.0, True
+        self._turning, self._asked, self._refused = 0.0, 0.0, True
 
     def go_up(self) -> None:
         """The leg of a foot that comes down pulls the body along: up again, and to a nearer place in the end."""
@@ -206,4 +212,5 @@ class Swing:
         height = max(position[2] - speed * dt, min(lowest, position[2]) if not level else 0.0)
         if not level:
             flat = matrix_from_rotation_vector(tilt * (s.level_speed * dt / angle)) @ rotation
+        self._asked = float(position[2]) - height
         return np.array([self._start[0], self._start[1], height]), flat, level and height <= s.touch_height
