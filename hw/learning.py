@@ -1,4 +1,4 @@
-"""Gravity compensation that learns how soft the servos really are, from how far the legs hang below their command.
+"""Load compensation that learns how soft the servos really are, from how far the legs hang below their command.
 
 Nobody publishes a servo's stiffness, it differs from robot to robot, and a wrong one makes a foot touch down where it
 was planned in the air. A servo at rest hangs below its command by ``torque / stiffness``; with the torque u k that
@@ -17,10 +17,10 @@ import numpy as np
 
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.physics import GRAVITY
-from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.compensation import LoadCompensation
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import lean, quat_from_angles
-from naoimitate.hw.servo_command import Target
+from naoimitate.hw.target import Target
 from naoimitate.robot.model import RobotModel
 
 
@@ -62,7 +62,7 @@ DEFAULT = LearningSettings()
 
 
 class LearningCompensation:
-    """A ``ServoCommand`` like gravity compensation of a nominal stiffness, (J,) or one for all, N m/rad; see above.
+    """A ``ServoCommand`` like load compensation of a nominal stiffness, (J,) or one for all, N m/rad; see above.
 
     period: s between two calls. Nothing is learned from a state that is not known (NaN, not newer than the last), nor
     where the feet do not carry as they should, or the robot is not in the posture that it is sent; what was learned
@@ -75,7 +75,7 @@ class LearningCompensation:
     def __init__(
         self, robot: RobotModel, stiffness: Array | float, period: float, settings: LearningSettings = DEFAULT
     ) -> None:
-        self._gravity, self._robot, self._stiffness = GravityCompensation(robot), robot, stiffness
+        self._load, self._robot, self._stiffness = LoadCompensation(robot), robot, stiffness
         self._period, self._s = period, settings
         self._legs = {side.upper(): np.array(robot.chains[f"{side}_leg"]) for side in SIDES}
         self._legs["D"] = np.concatenate([self._legs["L"], self._legs["R"]])
@@ -90,7 +90,7 @@ class LearningCompensation:
 
     def __call__(self, target: Target, state: RobotState) -> Array:
         """Servo angles (J,) rad that end up at a target."""
-        nominal = self._gravity.command(target.q, target.base_quat, target.support, self._stiffness)
+        nominal = self._load.command(target.q, target.base_quat, target.support, self._stiffness, target.acceleration)
         sag = nominal - target.q
         self._look(target, state)
         command = self._offset_from(nominal, sag)
@@ -117,7 +117,7 @@ class LearningCompensation:
         s, legs = self._s, self._legs[target.support]
         share = self._period / s.memory
         torso = quat_from_angles(state.angles)
-        nominal = (self._gravity.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
+        nominal = (self._load.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
         if nominal @ nominal < s.telling**2:
             return
         sag = (self._behind - state.q)[legs]
@@ -140,4 +140,4 @@ class LearningCompensation:
         if not lean(target.base_quat, state.angles) < s.leaning:
             return False
         loads = state.fsr.sum(axis=1) / self._weight
-        return bool((np.abs(loads - self._gravity.share) < s.carrying).all())  # NaN is no
+        return bool((np.abs(loads - self._load.share) < s.carrying).all())  # NaN is no

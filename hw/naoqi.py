@@ -38,7 +38,7 @@ from naoimitate.hw.naoqi_start import (
     stand_up,
     wake,
 )
-from naoimitate.hw.servo_command import Target, target_of
+from naoimitate.hw.target import Target, target_of
 from naoimitate.robot.model import RobotModel
 
 SILENCE = 0.5

@@ -8,7 +8,7 @@ from naoimitate.calib.zeros import JointZeros
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.naoqi_link import NaoqiLink
-from naoimitate.hw.servo_command import ServoCommand, Target
+from naoimitate.hw.target import ServoCommand, Target
 from naoimitate.robot.model import RobotModel
 
 HEADROOM = 1.2

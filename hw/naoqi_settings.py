@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from naoimitate.hw.feedback import feedback
-from naoimitate.hw.learning import LearningCompensation
-from naoimitate.hw.servo_command import ServoCommand, servo_command
+from naoimitate.hw.target import ServoCommand
 from naoimitate.robot.model import RobotModel
 
 
@@ -44,8 +43,4 @@ def loops_of(robot: RobotModel, settings: NaoqiSettings) -> ServoCommand:
     """What gravity and balance add to a target, new for each connection: loops remember the robot's clock."""
     known = settings.servo_stiffness
     stiffness = None if known is None else known * settings.stiffness
-    if settings.balance:
-        return feedback(robot, stiffness, settings.period)
-    if settings.learning and stiffness is not None:
-        return LearningCompensation(robot, stiffness, settings.period)
-    return servo_command(robot, stiffness)
+    return feedback(robot, stiffness, settings.period, learning=settings.learning, balance=settings.balance)

@@ -17,7 +17,7 @@ import numpy as np
 
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.hw.driver import RobotState
-from naoimitate.hw.servo_command import ServoCommand, Target
+from naoimitate.hw.target import ServoCommand, Target
 from naoimitate.robot.model import RobotModel
 
 
@@ -109,4 +109,7 @@ class Pacing:
         """The target of so many s ago."""
         frame, part = divmod(ago / self._period, 1.0)
         newer, older = (self._plan[min(int(frame) + k, len(self._plan) - 1)] for k in (0, 1))
-        return newer._replace(q=newer.q + part * (older.q - newer.q)) if part else newer
+        if not part:
+            return newer
+        q, place = newer.q + part * (older.q - newer.q), newer.base_pos + part * (older.base_pos - newer.base_pos)
+        return newer._replace(q=q, base_pos=place, time=newer.time + part * (older.time - newer.time))

@@ -10,7 +10,7 @@ from naoimitate.balance.polygon import room_around, support_polygon
 from naoimitate.balance.pose import Pose, PoseMaker
 from naoimitate.balance.retarget import Reach
 from naoimitate.core.frames import Array
-from naoimitate.hw.servo_command import Target
+from naoimitate.hw.target import Target
 from naoimitate.robot.model import RobotModel
 
 FARTHEST = 0.16

@@ -27,9 +27,9 @@ from naoimitate.hw.compensation import share_of_weight
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import lean
 from naoimitate.hw.planted_shift import PlantedShift
-from naoimitate.hw.servo_command import ServoCommand, Target
 from naoimitate.hw.sole_heights import HEIGHTS, HeightSettings, SoleHeights
 from naoimitate.hw.sway import Sway, SwayMeter
+from naoimitate.hw.target import ServoCommand, Target
 from naoimitate.robot.model import RobotModel
 
 PARTS = (1.0, 0.8, 0.6, 0.4, 0.2, 0.0)

@@ -17,7 +17,7 @@ from naoimitate.core.frames import SIDES, Array
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import up_from_angles
 from naoimitate.hw.planted_shift import PlantedShift, level
-from naoimitate.hw.servo_command import Target
+from naoimitate.hw.target import Target
 
 SMOOTHING = 0.03
 """[s] over which the velocity is smoothed: a count of 0.1 deg in 10 ms looks like 0.17 rad/s."""

@@ -12,8 +12,7 @@ from naoimitate.core.falling import has_tipped, tilt
 from naoimitate.core.frames import Array, RobotCommand
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.feedback import feedback
-from naoimitate.hw.learning import LearningCompensation
-from naoimitate.hw.servo_command import ServoCommand, Target, servo_command, target_of
+from naoimitate.hw.target import ServoCommand, Target, target_of
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.model import Scene
 from naoimitate.sim.physics import Physics
@@ -124,12 +123,9 @@ class MujocoDriver:
 
     def _closed(self) -> ServoCommand:
         """What is added to a target, new for each connection: loops remember the robot's clock and its servos."""
-        (compensation, learning, balance), stiffness = self._loops, self._settings.stiffness
-        if balance:
-            return feedback(self._robot, stiffness if compensation else None, self.period)
-        if compensation and learning:
-            return LearningCompensation(self._robot, stiffness, self.period)
-        return servo_command(self._robot, stiffness if compensation else None)
+        compensation, learning, balance = self._loops
+        stiffness = self._settings.stiffness if compensation else None
+        return feedback(self._robot, stiffness, self.period, learning=learning, balance=balance)
 
     def _place(self) -> None:
         target, self._held, self._servos = self._stand, False, self._closed()

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from naoimitate.core.falling import has_fallen, has_tipped, swing_load, tilt
 from naoimitate.core.frames import SIDES, Array
 from naoimitate.core.geometry import convex_hull, polygon_margin
-from naoimitate.hw.servo_command import ServoCommand, Target, servo_command
+from naoimitate.hw.servo_command import servo_command
+from naoimitate.hw.target import ServoCommand, Target
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance, disturb_model, disturbed_settings
 from naoimitate.sim.disturbance_line import CommandLine
@@ -90,7 +91,8 @@ def simulate(
     ground: the floor's height under each foot, level at 0 without one; neither plan nor driver know it.
     until_tipped: end with the frame in which the torso tips.
     """
-    plan = [Target(*frame) for frame in zip(q, base_pos, base_quat, support.tolist(), strict=True)]
+    postures = zip(q, base_pos, base_quat, support.tolist(), strict=True)
+    plan = [Target(*posture, time=moment) for posture, moment in zip(postures, time.tolist(), strict=True)]
     openings = np.full((len(time), 2), np.nan) if hand_opening is None else hand_opening
     if disturbance is None:
         disturbance, settings = Disturbance(), replace(settings, stiffness=stiffness)
@@ -99,7 +101,7 @@ def simulate(
     physics = Physics(robot, settings, None if ground is None else split_floor)
     disturb_model(physics.model, physics.data, physics.torso, disturbance)
     physics.place(*plan[0][:3], openings[0])
-    control = control or servo_command(robot, stiffness if compensation else None)
+    control = control or servo_command(robot, stiffness if compensation else None, period_of(time))
     samples = []
     for target in _play(physics, plan, time - time[0], openings, disturbance, control, ground):
         samples.append(_sample(robot, physics, target.support))
@@ -142,9 +144,14 @@ def _play(
             yield target
 
 
+def period_of(time: Array) -> float:
+    """The usual time between two frames at (T,) s, in s."""
+    return float(np.median(np.diff(time))) if len(time) > 1 else STAND_TIME
+
+
 def _before(moments: Array) -> list[float]:
     """Moments (s) before the first frame at which a robot that stands there is sent it, as often as the others."""
-    period = float(np.median(np.diff(moments))) if len(moments) > 1 else STAND_TIME
+    period = period_of(moments)
     return [-period * count for count in range(round(STAND_TIME / period), 0, -1)]
 
 

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from naoimitate.core.falling import HEIGHT_LIMIT, TILT_LIMIT, has_tipped
 from naoimitate.core.frames import Array
 from naoimitate.hw.feedback import feedback
-from naoimitate.hw.servo_command import ServoCommand
+from naoimitate.hw.target import ServoCommand
 from naoimitate.robot.model import RobotModel
 from naoimitate.sim.disturbance import Disturbance
 from naoimitate.sim.settings import SimSettings
-from naoimitate.sim.simulate import SimResult, simulate
+from naoimitate.sim.simulate import SimResult, period_of, simulate
 
 TIPPED, SANK, LOADED = "tipped", "sank", "swing foot loaded"
 """What can fail; see ``core.falling``."""
@@ -74,7 +74,7 @@ def play(
     """
     stiffness = disturbance.stiffness if known_stiffness else SimSettings.stiffness
     if closed and control is None:
-        control = feedback(robot, stiffness, float(np.median(np.diff(plan.time))))
+        control = feedback(robot, stiffness, period_of(plan.time))
     result = simulate(
         robot,
         plan.time,

@@ -15,7 +15,7 @@ from naoimitate.command_gate import CommandGate
 from naoimitate.core.errors import DriverError
 from naoimitate.hw.can import CanDriver, CanSettings
 from naoimitate.hw.can.joints import read_joint_map
-from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.compensation import LoadCompensation
 from naoimitate.hw.driver import Driver
 from naoimitate.hw.guarded import GuardedDriver
 from naoimitate.robot import RobotModel
@@ -126,7 +126,7 @@ def test_servos_are_sent_what_gravity_takes_from_them(nao: RobotModel) -> None:
         for support in ("D", "L"):
             q = nao.postures["stand"]
             it.driver.write(replace(command(nao, q), support=support))
-            torque = GravityCompensation(nao).torque(q, UPRIGHT, support)
+            torque = LoadCompensation(nao).torque(q, UPRIGHT, support)
             expected = np.clip(q + torque / 150.0, nao.lower, nao.upper)[joints.joint[own]]
             nodes = np.array(joints.nodes)[own]
             assert wait_for(

@@ -15,7 +15,8 @@ from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.hw.learning import LearningCompensation, LearningSettings
 from naoimitate.hw.planted_shift import PlantedShift
-from naoimitate.hw.servo_command import ServoCommand, Target, servo_command
+from naoimitate.hw.servo_command import servo_command
+from naoimitate.hw.target import ServoCommand, Target
 from naoimitate.robot import RobotModel, load_robot
 from naoimitate.robot.model import Array
 from naoimitate.sim.disturbance import Disturbance
@@ -39,7 +40,7 @@ def hold(robot: RobotModel, q: Array, support: str, control: ServoCommand, **dis
 
 def hanging(factor: float, target: Target = STAND, moment: float = 0.0) -> RobotState:
     """A robot at rest on both feet whose servos hang ``factor`` times as far as nominal ones below their command."""
-    nominal = servo_command(NAO, NOMINAL)(target, None)  # type: ignore[arg-type]  # looks at no state
+    nominal = servo_command(NAO, NOMINAL, PERIOD)(target, None)  # type: ignore[arg-type]  # looks at no state
     q = target.q + (1.0 - factor) * (nominal - target.q)
     nan, fsr = np.full(len(q), np.nan), np.full((2, 4), NAO.mass * 9.81 / 8.0)
     return RobotState(moment, q, nan, np.zeros(2), np.zeros(3), np.zeros(3), fsr, fell=False)
@@ -61,7 +62,7 @@ def test_soft_servos_are_learned_and_the_robot_stands_where_it_should(stiffness:
     assert learning.factor == pytest.approx(NOMINAL / stiffness, rel=0.25)
     legs = [j for side in "lr" for j in NAO.chains[f"{side}_leg"]]
     off = np.abs(result.q[-1] - q)[legs].max()
-    plain = hold(NAO, q, support, servo_command(NAO, NOMINAL), stiffness=stiffness)
+    plain = hold(NAO, q, support, servo_command(NAO, NOMINAL, PERIOD), stiffness=stiffness)
     assert off < 0.5 * np.abs(plain.q[-1] - q)[legs].max()
 
 
@@ -78,7 +79,7 @@ def test_at_rest_on_servos_as_supposed_it_does_nothing(support: str) -> None:
     hold(NAO, q, support, learning, noise=1.0)
     assert learning.factor == 1.0
     state = hanging(1.0, moment=99.0)
-    np.testing.assert_array_equal(learning(STAND, state), servo_command(NAO, NOMINAL)(STAND, state))
+    np.testing.assert_array_equal(learning(STAND, state), servo_command(NAO, NOMINAL, PERIOD)(STAND, state))
 
 
 def test_what_it_hears_in_this_file_is_otherwise_believed() -> None:
@@ -137,7 +138,7 @@ def test_what_was_learned_stays_when_the_state_gets_lost() -> None:
 @given(st.lists(st.tuples(st.floats(-5.0, 50.0), st.floats(-0.4, 0.4), st.integers(0, 2)), min_size=1, max_size=60))
 def test_whatever_it_senses_its_commands_stay_within_their_bounds(seen: list[tuple[float, float, int]]) -> None:
     """Sags of any size, and postures anywhere in the range of the legs."""
-    learning, plain = LearningCompensation(NAO, NOMINAL, PERIOD), servo_command(NAO, NOMINAL)
+    learning, plain = LearningCompensation(NAO, NOMINAL, PERIOD), servo_command(NAO, NOMINAL, PERIOD)
     last = np.zeros(len(STAND.q))
     for i, (factor, bend, support) in enumerate(seen):
         q = STAND.q.copy()

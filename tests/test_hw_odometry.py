@@ -16,7 +16,8 @@ from naoimitate.core.geometry import heading, matrix_from_quat, wrap
 from naoimitate.core.physics import GRAVITY
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.odometry import Odometry, Place
-from naoimitate.hw.servo_command import Target, servo_command
+from naoimitate.hw.servo_command import servo_command
+from naoimitate.hw.target import Target
 from naoimitate.motion.builtin import builtin_motion
 from naoimitate.robot import RobotModel
 from naoimitate.robot.model import Array
@@ -56,7 +57,7 @@ Blind = Callable[[RobotState], RobotState]
 
 def walked(name: str, stiffness: float, noise: float, blind: Blind = lambda state: state, seed: int = 0) -> Error:
     """The robot plays a built-in motion on simulated servos, and the odometry is told what it measures."""
-    run, servos, odometry, places = run_of(name), servo_command(NAO, stiffness), Odometry(NAO), list[Place]()
+    run, servos, odometry, places = run_of(name), servo_command(NAO, stiffness, PERIOD), Odometry(NAO), list[Place]()
 
     def control(target: Target, state: RobotState) -> Array:
         places.append(odometry.update(blind(state), target.support))

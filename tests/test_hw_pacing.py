@@ -13,7 +13,7 @@ from naoimitate import load_robot
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import UPRIGHT
 from naoimitate.hw.pacing import DEFAULT, Pacing
-from naoimitate.hw.servo_command import Target
+from naoimitate.hw.target import Target
 from naoimitate.robot.model import Array
 
 NAO = load_robot("nao")

@@ -11,8 +11,8 @@ from naoimitate import load_robot
 from naoimitate.hw.driver import RobotState
 from naoimitate.hw.lean import quat_from_angles
 from naoimitate.hw.planted_shift import PlantedShift, level
-from naoimitate.hw.servo_command import Target
 from naoimitate.hw.sway import SwayMeter
+from naoimitate.hw.target import Target
 from naoimitate.robot.model import Array
 
 NAO = load_robot("nao")

@@ -10,7 +10,7 @@ from naoimitate.balance.legs import POSE, LegLimits, Stance, build_legs, free_go
 from naoimitate.balance.tangent import differentiate, make_tangent, place
 from naoimitate.core.geometry import quat_from_matrix
 from naoimitate.core.physics import GRAVITY
-from naoimitate.hw.compensation import GravityCompensation
+from naoimitate.hw.compensation import LoadCompensation
 from naoimitate.robot.model import RobotModel
 
 STEP = 1e-6
@@ -77,7 +77,7 @@ def test_levers_of_load_are_the_torques_that_hold_the_body(robot: RobotModel, si
     scene = Scene(robot, 7, (1.0 - side, float(side)))
     levers, _ = scene.loads(scene.q)
     quat = quat_from_matrix(scene.tangent.R)
-    torque = GravityCompensation(robot).torque(scene.q, quat, "LR"[side])
+    torque = LoadCompensation(robot).torque(scene.q, quat, "LR"[side])
     expected = np.abs(torque[scene.legs.loaded.ravel()])
     within = expected < robot.effort[scene.legs.loaded.ravel()]
     assert within.any()

@@ -52,7 +52,7 @@ class Landing:
 
 
 def play(run: Run, ground: Ground | None, closed: bool = False) -> SimResult:
-    control = feedback(NAO, STIFFNESS, PERIOD) if closed else servo_command(NAO, STIFFNESS)
+    control = feedback(NAO, STIFFNESS, PERIOD) if closed else servo_command(NAO, STIFFNESS, PERIOD)
     return simulate(NAO, run.time, run.q, run.base_pos, run.base_quat, run.support, control=control, ground=ground)
 
 

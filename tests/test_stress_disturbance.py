@@ -10,7 +10,7 @@ import pytest
 
 from naoimitate.core.errors import RobotModelError
 from naoimitate.hw.driver import RobotState
-from naoimitate.hw.servo_command import Target
+from naoimitate.hw.target import Target
 from naoimitate.robot import RobotModel
 from naoimitate.robot.model import Array
 from naoimitate.sim.disturbance import PUSH_TIME, Disturbance, disturb_model, disturbed_settings

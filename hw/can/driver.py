@@ -26,8 +26,9 @@ from naoimitate.hw.can.senses import sensed
 from naoimitate.hw.can.startup import Startup
 from naoimitate.hw.driver import INTERRUPTED, RobotState
 from naoimitate.hw.lean import UPRIGHT
-from naoimitate.hw.servo_command import Target, servo_command, target_of
+from naoimitate.hw.servo_command import servo_command
 from naoimitate.hw.spell import Spell
+from naoimitate.hw.target import Target, target_of
 from naoimitate.robot.model import RobotModel
 
 FAULTY = 0.3
@@ -67,7 +68,8 @@ class CanDriver:
         self._bitrate = bitrate_of(robot) if bitrate is None else bitrate
         self.load = check_load(self._codec.traffic(self._period), self._bitrate, self._period)
         self._stand = Target(robot.postures["stand"], np.zeros(3), UPRIGHT, "D")
-        self._servos = servo_command(robot, self._map.scatter(self._map.stiffness) if compensation else None)
+        stiffness = self._map.scatter(self._map.stiffness) if compensation else None
+        self._servos = servo_command(robot, stiffness, self._period)
         self._health = Health(self._map)
         self._sender: Sender | None = None
         self._letting_go = threading.RLock()

@@ -17,7 +17,7 @@ from naoimitate.hw.can.link import Link
 from naoimitate.hw.can.senses import sensed
 from naoimitate.hw.can.setpoint import Setpoint
 from naoimitate.hw.driver import RobotState
-from naoimitate.hw.servo_command import ServoCommand, Target
+from naoimitate.hw.target import ServoCommand, Target
 
 LATEST = 2
 """Periods that a late cycle may make up for at most."""

@@ -22,12 +22,11 @@ def simulated(run: Run, robot: RobotModel, stiffness: float | None = None, close
     """
     from naoimitate.cli.progress import progress
     from naoimitate.hw.feedback import feedback
-    from naoimitate.hw.servo_command import servo_command
     from naoimitate.sim.settings import SimSettings
     from naoimitate.sim.simulate import simulate
 
     nominal, period = SimSettings.stiffness, float(np.median(np.diff(run.time))) if len(run) > 1 else SimSettings.period
-    control = feedback(robot, nominal, period) if closed else servo_command(robot, nominal)
+    control = feedback(robot, nominal, period, learning=closed, balance=closed)
     with progress("simulating") as advance:
         result = simulate(
             robot,

@@ -1,0 +1,85 @@
+"""How a plan's links accelerate: what servos have to give beside what gravity asks for.
+
+A soft servo that is told of gravity alone swings after every shift of weight, as a mass on a spring does when its other
+end is moved; told of the plan's accelerations, it is pushed and braked by just what the motion takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+
+import numpy as np
+
+from naoimitate.core.frames import Array
+from naoimitate.core.geometry import matrix_from_quat
+from naoimitate.hw.driver import RobotState
+from naoimitate.hw.target import ServoCommand, Target
+from naoimitate.robot.kernel import forward
+from naoimitate.robot.model import RobotModel
+
+APART = 0.02
+"""[s] of the plan's time between the postures that tell an acceleration, at least: they are late by so much, and a
+plan's second differences are rough."""
+LATE = 2.5
+"""Times as long as usual without a new posture after which the plan stands still."""
+MOST = 6.0
+"""[m/s^2] of the centre of mass, beyond which a plan has jumped: none that a robot can follow goes on like that."""
+
+
+class Inertia:
+    """A ``ServoCommand`` around another one, which it tells the accelerations of its targets.
+
+    period: s between two calls. The plan's own clock counts, so that it does not matter when a target is taken up. A
+    target without a time has no acceleration, nor has one whose plan has stopped, jumped, or gone back in time.
+    """
+
+    def __init__(self, robot: RobotModel, inner: ServoCommand, period: float) -> None:
+        self._tree, self._inner, self._period = robot.tree, inner, period
+        joints = len(robot.joint_names)
+        self._pos, self._rot = np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3, 3))
+        self._share = robot.tree.mass / robot.tree.mass.sum()
+        self._seen: deque[tuple[float, Array]] = deque(maxlen=3 + math.ceil(2.0 * APART / period))
+        self._acceleration = np.zeros((joints + 1, 3))
+        self._since, self._apart = 0.0, 0.0
+
+    def __call__(self, target: Target, state: RobotState) -> Array:
+        """Servo angles (J,) rad for a target."""
+        torso = matrix_from_quat(target.base_quat)
+        if self._seen and target.time == self._seen[0][0]:
+            self._since += self._period
+            if self._since > LATE * max(self._apart, self._period):
+                self._acceleration = np.zeros_like(self._acceleration)
+        else:
+            self._since = 0.0
+            self._see(target, torso)
+        return self._inner(target._replace(acceleration=self._acceleration @ torso), state)
+
+    def _see(self, target: Target, torso: Array) -> None:
+        """Take up a new posture of the plan."""
+        forward(self._tree, target.q, self._pos, self._rot)
+        local = self._pos + np.einsum("kij,kj->ki", self._rot, self._tree.com)
+        if not self._seen or not target.time > self._seen[0][0]:  # NaN is no
+            self._seen.clear()
+        self._seen.appendleft((target.time, target.base_pos + local @ torso.T))
+        self._apart = target.time - self._seen[1][0] if len(self._seen) > 1 else 0.0
+        self._acceleration = self._newest()
+        if np.linalg.norm(self._share @ self._acceleration) > MOST:
+            newest = self._seen[0]
+            self._seen.clear()
+            self._seen.appendleft(newest)
+            self._acceleration = np.zeros_like(self._acceleration)
+
+    def _newest(self) -> Array:
+        """Acceleration (J + 1, 3) m/s^2 in the world: divided differences of the newest posture and two before it."""
+        now, here = self._seen[0]
+        middle = self._before(now)
+        oldest = None if middle is None else self._before(middle[0])
+        if middle is None or oldest is None:
+            return np.zeros_like(self._acceleration)
+        last, first = (here - middle[1]) / (now - middle[0]), (middle[1] - oldest[1]) / (middle[0] - oldest[0])
+        return np.asarray(2.0 * (last - first) / (now - oldest[0]))
+
+    def _before(self, time: float) -> tuple[float, Array] | None:
+        """The newest posture that is at least ``APART`` older than a time (s)."""
+        return next((seen for seen in self._seen if seen[0] <= time - APART + 1e-6), None)
