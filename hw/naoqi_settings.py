@@ -30,7 +30,7 @@ class NaoqiSettings:
     approach: float = 0.3
     """[rad/s] Highest speed of the farthest joint on the way from NAOqi's stand to the model's posture ``stand``."""
     servo_stiffness: float | None = None
-    """[N m/rad] of the servos, for gravity compensation; None = none, since nobody publishes it: measure it first."""
+    """[N m/rad] of the servos, for load compensation; None = none, since nobody publishes it: measure it first."""
     learning: bool = False
     """Whether ``servo_stiffness`` is a guess that encoders and feet correct, see ``hw.learning``: tried in simulation
     only."""

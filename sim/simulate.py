@@ -83,7 +83,7 @@ def simulate(
     """Simulate a plan of T frames: time (T,) s, q (T, J) rad, torso (T, 3) m and (T, 4), support (T,) ``D L R``.
 
     hand_opening: (T, 2) of the hands, as in the run file; NaN keeps the last, without one they stay closed.
-    stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's gravity compensation.
+    stiffness: N m/rad of every servo, in place of the settings'. compensation: the driver's load compensation.
     progress: told the share that is done. Each frame's command is under way from the time of the frame before, and is
     due at its own.
     disturbance: how the robot, its servos and its world really are, in place of the settings; the plan and the driver

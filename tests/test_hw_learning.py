@@ -1,4 +1,4 @@
-"""Gravity compensation learns how soft the servos are, within bounds, and from nothing that it cannot believe."""
+"""Load compensation learns how soft the servos are, within bounds, and from nothing that it cannot believe."""
 
 from __future__ import annotations
 

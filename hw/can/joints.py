@@ -50,7 +50,7 @@ class MotorEntry:
     hot: float = 75.0
     """deg C from which on an alarm tells of it, below what makes the motor switch off."""
     stiffness: float = 150.0
-    """N m/rad at the joint when the stiffness is 1, for the gravity compensation."""
+    """N m/rad at the joint when the stiffness is 1, for load compensation."""
     torque_constant: float = float("nan")
     """N m at the joint per A; without it torques are not measured."""
 

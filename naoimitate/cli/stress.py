@@ -52,7 +52,7 @@ def stress(motions: tuple[str, ...], as_json: bool, check: bool, **options: Any)
     """Disturb the simulated robot and count its falls.
 
     Servos, masses, floor, commands and sensors differ from what was planned, and somebody pushes. Draws take the
-    motions in turn, all built-in ones by default: each disturbance alone, then all at once. Gravity compensation goes
+    motions in turn, all built-in ones by default: each disturbance alone, then all at once. Load compensation goes
     on believing in the nominal robot.
     """
     from naoimitate.robot import load_robot
