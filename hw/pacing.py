@@ -2,8 +2,8 @@
 
 Commands that do not arrive leave the servos where they are while the plan goes on, and the first one that arrives again
 is a jump: in the middle of a shift of weight it throws the body over. So when the legs stand still that were sent
-somewhere else, the plan goes back to where they still followed it, and waits there until they move; then it goes on, a
-little faster until it has caught up.
+somewhere else, the plan goes back to where they still followed it, and waits there until they move; then it goes on,
+from rest as they do, and a little faster until it has caught up.
 
 What is sent is always a posture of the plan, at most ``most`` s old.
 """
@@ -41,8 +41,10 @@ class PacingSettings:
     """[s] Longest that the plan is behind, and that it waits."""
     back: float = 1.0
     """Speed at which the plan goes back, as a share of its own."""
-    ahead: float = 0.25
+    ahead: float = 0.05
     """By how much faster than itself it goes while it catches up, likewise."""
+    ramp: float = 0.1
+    """[s] in which it gets from rest to its own speed."""
 
 
 DEFAULT = PacingSettings()
@@ -63,7 +65,7 @@ class Pacing:
         self._plan: deque[Target] = deque(maxlen=2 + round(settings.most / period))
         self._sent: deque[Array] = deque(maxlen=self._lag + self._watched)
         self._seen: deque[Array] = deque(maxlen=self._watched + 1)
-        self._time, self._waited = -np.inf, 0.0
+        self._time, self._waited, self._speed = -np.inf, 0.0, 1.0
         self._stood: Array | None = None
         self.behind = 0.0
         """[s] by which what is sent is behind the plan."""
@@ -73,13 +75,14 @@ class Pacing:
         s, period = self._s, self._period
         self._plan.appendleft(target)
         if self._waits(state):
-            self._waited += period
+            self._waited, self._speed = self._waited + period, 0.0
             wanted = min(s.lead + self._waited, s.most)
             self.behind = min(self.behind + (1.0 + s.back) * period, max(wanted, self.behind + period), s.most)
         else:
             self._waited = 0.0
-            self.behind = max(self.behind - s.ahead * period, 0.0)
-        sent = self._at(self.behind)
+            self._speed = min(self._speed + period / s.ramp, 1.0 + s.ahead if self.behind > 0.0 else 1.0)
+            self.behind = min(max(self.behind + (1.0 - self._speed) * period, 0.0), s.most)
+        sent = self._at(self.behind)._replace(time=target.time)
         self._sent.appendleft(sent.q[self._legs])
         return self.inner(sent, state)
 

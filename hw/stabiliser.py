@@ -48,12 +48,11 @@ class StabiliserSettings:
     """[m/s] of shift."""
     margin: float = 0.015
     """[m] by which the CoM of what is commanded stays inside the stance soles."""
-    damping: tuple[float, float] = (0.004, 0.01)
+    damping: tuple[float, float] = (0.004, 0.004)
     """[s], forwards or backwards and to a side, times the CoM's error of velocity and the servos' softness: how far the
-    body is moved against its sway. To a side it is half as much damping as simulated servos of 300 N m/rad have of
-    themselves. On one foot the robot sways with a tenth of critical damping on servos of 60 N m/rad, at 8 rad/s, and
-    with a quarter at 300, at 19 rad/s; with twice as much from here a line that is 20 ms late makes it sway, forwards
-    and backwards, where the torso also nods at 25 rad/s, with less."""
+    body is moved against its sway: a fifth of the damping that simulated servos of 300 N m/rad have of themselves. On
+    one foot the robot sways with a tenth of critical damping on servos of 60 N m/rad, at 8 rad/s, and with a quarter
+    at 300, at 19 rad/s; with twice as much from here to a side a line that is 20 ms late makes soft servos tremble."""
     on_both: float = 0.25
     """Share of that on both feet, where twice as many joints hold the body, each with half as much."""
     most_damping: float = 0.008

@@ -86,11 +86,21 @@ def test_after_lost_commands_the_servos_take_up_the_plan_where_they_stand() -> N
 
 
 def test_it_catches_up() -> None:
-    pacing, sent = play(200, lost(40, 62))
+    pacing, sent = play(900, lost(40, 62))
     assert pacing.behind == 0.0
-    np.testing.assert_array_equal(sent[-1], leaning(199 * PERIOD))
-    fastest = np.abs(np.diff(sent[64:, ROLLS[0]])).max() / PERIOD
-    assert fastest == pytest.approx((1.0 + DEFAULT.ahead) * SPEED, rel=1e-6)
+    np.testing.assert_array_equal(sent[-1], leaning(899 * PERIOD))
+    speed = np.diff(sent[:, ROLLS[0]]) / PERIOD
+    assert speed[64:].max() == pytest.approx((1.0 + DEFAULT.ahead) * SPEED, rel=1e-6)
+
+
+def test_it_goes_on_gently() -> None:
+    """From rest, as the robot's legs are then, to its own speed."""
+    _, sent = play(200, lost(40, 62))
+    speed = np.diff(sent[:, ROLLS[0]]) / PERIOD
+    begin = np.flatnonzero(speed <= 0.0)[-1]
+    assert begin > 60
+    assert np.diff(speed[begin:]).max() <= SPEED * PERIOD / DEFAULT.ramp + 1e-9
+    assert speed[begin + round(1.2 * DEFAULT.ramp / PERIOD)] >= SPEED
 
 
 def test_a_blocked_robot_is_not_waited_for_for_ever() -> None:
