@@ -23,7 +23,8 @@ def feedback(
     """Load compensation that learns how soft the servos are, under balance from what the robot measures.
 
     stiffness: what the servos are taken for, (J,) or one for all, N m/rad; None: nobody knows, and balance is alone.
-    period: s between two calls. Without ``balance`` nothing else is closed but ``learning``, where that is asked for.
+    period: s between two calls. Balance needs what learning finds, and brings it along; without ``balance`` nothing
+    else is closed but ``learning``, where that is asked for.
     """
     if not balance:
         if learning and stiffness is not None:

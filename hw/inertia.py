@@ -21,9 +21,9 @@ from naoimitate.robot.model import RobotModel
 APART = 0.02
 """[s] of the plan's time between the postures that tell an acceleration, at least: they are late by so much, and a
 plan's second differences are rough."""
-LATE = 2.5
-"""Times as long as usual without a new posture after which the plan stands still."""
-MOST = 6.0
+LATE, LONGEST = 2.5, 0.2
+"""Times as long as usual, and [s] as usual at most, without a new posture after which the plan stands still."""
+MOST = 5.0
 """[m/s^2] of the centre of mass, beyond which a plan has jumped: none that a robot can follow goes on like that."""
 
 
@@ -39,44 +39,52 @@ class Inertia:
         joints = len(robot.joint_names)
         self._pos, self._rot = np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3, 3))
         self._share = robot.tree.mass / robot.tree.mass.sum()
-        self._seen: deque[tuple[float, Array]] = deque(maxlen=3 + math.ceil(2.0 * APART / period))
-        self._acceleration = np.zeros((joints + 1, 3))
-        self._since, self._apart = 0.0, 0.0
+        self._seen: deque[tuple[float, Array]] = deque()
+        self._still = np.zeros((joints + 1, 3))
+        self._acceleration = self._still
+        self._newest, self._since, self._apart = math.nan, 0.0, 0.0
 
     def __call__(self, target: Target, state: RobotState) -> Array:
         """Servo angles (J,) rad for a target."""
         torso = matrix_from_quat(target.base_quat)
-        if self._seen and target.time == self._seen[0][0]:
+        if target.time == self._newest:
             self._since += self._period
             if self._since > LATE * max(self._apart, self._period):
-                self._acceleration = np.zeros_like(self._acceleration)
+                self._begin()
         else:
-            self._since = 0.0
             self._see(target, torso)
         return self._inner(target._replace(acceleration=self._acceleration @ torso), state)
 
     def _see(self, target: Target, torso: Array) -> None:
         """Take up a new posture of the plan."""
+        if target.time > self._newest:
+            self._apart = min(target.time - self._newest, LONGEST)
+        else:  # NaN, or back in time
+            self._begin()
+        self._newest, self._since = target.time, 0.0
         forward(self._tree, target.q, self._pos, self._rot)
         local = self._pos + np.einsum("kij,kj->ki", self._rot, self._tree.com)
-        if not self._seen or not target.time > self._seen[0][0]:  # NaN is no
-            self._seen.clear()
-        self._seen.appendleft((target.time, target.base_pos + local @ torso.T))
-        self._apart = target.time - self._seen[1][0] if len(self._seen) > 1 else 0.0
-        self._acceleration = self._newest()
+        here = (target.time, target.base_pos + local @ torso.T)
+        self._seen.appendleft(here)
+        self._acceleration = self._differences()
         if np.linalg.norm(self._share @ self._acceleration) > MOST:
-            newest = self._seen[0]
-            self._seen.clear()
-            self._seen.appendleft(newest)
-            self._acceleration = np.zeros_like(self._acceleration)
+            self._begin()
+            self._seen.appendleft(here)
 
-    def _newest(self) -> Array:
+    def _begin(self) -> None:
+        """The plan starts from rest."""
+        self._seen.clear()
+        self._acceleration = self._still
+
+    def _differences(self) -> Array:
         """Acceleration (J + 1, 3) m/s^2 in the world: divided differences of the newest posture and two before it."""
         now, here = self._seen[0]
         middle = self._before(now)
         oldest = None if middle is None else self._before(middle[0])
         if middle is None or oldest is None:
-            return np.zeros_like(self._acceleration)
+            return self._still
+        while self._seen[-1][0] < oldest[0]:
+            self._seen.pop()
         last, first = (here - middle[1]) / (now - middle[0]), (middle[1] - oldest[1]) / (middle[0] - oldest[0])
         return np.asarray(2.0 * (last - first) / (now - oldest[0]))
 

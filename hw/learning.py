@@ -117,7 +117,8 @@ class LearningCompensation:
         s, legs = self._s, self._legs[target.support]
         share = self._period / s.memory
         torso = quat_from_angles(state.angles)
-        nominal = (self._load.command(target.q, torso, target.support, self._stiffness) - target.q)[legs]
+        loaded = self._load.command(target.q, torso, target.support, self._stiffness, target.acceleration)
+        nominal = (loaded - target.q)[legs]
         if nominal @ nominal < s.telling**2:
             return
         sag = (self._behind - state.q)[legs]

@@ -40,7 +40,7 @@ class NaoqiSettings:
 
 
 def loops_of(robot: RobotModel, settings: NaoqiSettings) -> ServoCommand:
-    """What gravity and balance add to a target, new for each connection: loops remember the robot's clock."""
+    """What load and balance add to a target, new for each connection: loops remember the robot's clock."""
     known = settings.servo_stiffness
     stiffness = None if known is None else known * settings.stiffness
     return feedback(robot, stiffness, settings.period, learning=settings.learning, balance=settings.balance)

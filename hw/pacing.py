@@ -10,6 +10,7 @@ What is sent is always a posture of the plan, at most ``most`` s old.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
 
@@ -75,14 +76,16 @@ class Pacing:
         s, period = self._s, self._period
         self._plan.appendleft(target)
         if self._waits(state):
-            self._waited, self._speed = self._waited + period, 0.0
-            wanted = min(s.lead + self._waited, s.most)
-            self.behind = min(self.behind + (1.0 + s.back) * period, max(wanted, self.behind + period), s.most)
+            self._waited += period
+            before, most = self.behind, max(s.most - 0.5 * s.ramp, self.behind)
+            wanted = max(s.lead + self._waited, before + period)
+            self.behind = min(before + (1.0 + s.back) * period, wanted, most)
+            self._speed = max(1.0 - (self.behind - before) / period, 0.0)
         else:
             self._waited = 0.0
             self._speed = min(self._speed + period / s.ramp, 1.0 + s.ahead if self.behind > 0.0 else 1.0)
             self.behind = min(max(self.behind + (1.0 - self._speed) * period, 0.0), s.most)
-        sent = self._at(self.behind)._replace(time=target.time)
+        sent = self._at(self.behind)._replace(time=math.nan if self._waited else target.time)
         self._sent.appendleft(sent.q[self._legs])
         return self.inner(sent, state)
 
@@ -114,5 +117,10 @@ class Pacing:
         newer, older = (self._plan[min(int(frame) + k, len(self._plan) - 1)] for k in (0, 1))
         if not part:
             return newer
-        q, place = newer.q + part * (older.q - newer.q), newer.base_pos + part * (older.base_pos - newer.base_pos)
-        return newer._replace(q=q, base_pos=place, time=newer.time + part * (older.time - newer.time))
+        turned = np.copysign(1.0, newer.base_quat @ older.base_quat) * older.base_quat
+        quat = newer.base_quat + part * (turned - newer.base_quat)
+        return newer._replace(
+            q=newer.q + part * (older.q - newer.q),
+            base_pos=newer.base_pos + part * (older.base_pos - newer.base_pos),
+            base_quat=quat / np.linalg.norm(quat),
+        )

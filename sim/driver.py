@@ -27,8 +27,8 @@ class MujocoDriver:
     """A robot in MuJoCo that stands in its posture ``stand`` until the first command.
 
     real_time: a thread lets simulated time pass with the clock (and behind it, where the computer is too slow);
-    otherwise time passes only in ``advance``. compensation: add the servo commands that hold gravity; learning: for the
-    stiffness that the servos show, not just that of the settings; balance: all loops of ``hw.feedback``. scene:
+    otherwise time passes only in ``advance``. compensation: add the servo commands that hold the load; learning: for
+    the stiffness that the servos show, not just that of the settings; balance: all loops of ``hw.feedback``. scene:
     adds objects to the robot's world. The hands are closed until a command opens them.
     """
 

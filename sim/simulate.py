@@ -146,7 +146,7 @@ def _play(
 
 def period_of(time: Array) -> float:
     """The usual time between two frames at (T,) s, in s."""
-    return float(np.median(np.diff(time))) if len(time) > 1 else STAND_TIME
+    return float(np.median(np.diff(time))) if len(time) > 1 else DEFAULT.period
 
 
 def _before(moments: Array) -> list[float]:

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from naoimitate import imitate, load_motion
+from naoimitate.hw.driver import RobotState
 from naoimitate.hw.inertia import APART, Inertia
+from naoimitate.hw.pacing import Pacing
 from naoimitate.hw.servo_command import servo_command
 from naoimitate.hw.target import Target
 from naoimitate.robot import load_robot
@@ -89,6 +91,48 @@ def test_a_plan_that_stops_no_longer_accelerates() -> None:
     for _ in range(5):
         told = heard.at(19 * PERIOD, place(19 * PERIOD))
     assert not told.any()
+
+
+def test_a_plan_that_was_held_starts_from_rest() -> None:
+    """The speed before the hold is none of the motion after it."""
+    heard, speed = Heard(), np.array([0.15, 0.0, 0.0])
+    for k in range(20):
+        heard.at(k * PERIOD, k * PERIOD * speed)
+    for _ in range(10):
+        heard.at(19 * PERIOD, 19 * PERIOD * speed)
+    for k in range(30, 60):
+        told = heard.at(k * PERIOD, (19 * PERIOD + 0.2 * (k - 29) * PERIOD) * speed)
+        assert np.abs(told).max() < 1e-6
+
+
+def test_a_slow_plan_among_quick_calls() -> None:
+    """20 commands a second for a driver of 100: five calls for each, and its accelerations all the same."""
+    heard = Heard()
+    for k in range(200):
+        told = heard.at((k // 5) * 0.05, place((k // 5) * 0.05))
+    assert told == pytest.approx(HERE, abs=1e-6)
+
+
+def test_a_plan_that_waits_and_catches_up_has_no_rough_accelerations() -> None:
+    """The legs stand still for 0.2 s under an even turn of the torso; what is sent then are mixtures of its frames."""
+    heard = Heard()
+    pacing = Pacing(NAO, heard.inertia, PERIOD)
+    nan = np.full(3, np.nan)
+    for k in range(400):
+        q = STAND.copy()
+        legs = [j for side in "lr" for j in NAO.chains[f"{side}_leg"]]
+        q[legs] += 0.3 * k * PERIOD
+        pitch = 0.3 * k * PERIOD
+        quat = np.array([math.cos(0.5 * pitch), 0.0, math.sin(0.5 * pitch), 0.0])
+        seen = q - 0.012 if not 40 <= k < 60 else np.where(np.isin(np.arange(len(q)), legs), STAND + 0.108, q)
+        state = RobotState(
+            k * PERIOD, seen, np.full(len(q), np.nan), np.zeros(2), nan, nan, np.zeros((2, 4)), fell=False
+        )
+        pacing(Target(q, np.zeros(3), quat, "D", None, k * PERIOD), state)
+    told = np.array(heard.told)
+    assert pacing.behind > 0.0, "it catches up"
+    even = np.abs(told[10:35]).max()
+    assert np.abs(told[120:]).max() < 1.5 * even
 
 
 def test_a_plan_that_jumps_or_goes_back_or_has_no_time_does_not_accelerate() -> None:

@@ -40,7 +40,7 @@ class CanDriver:
     """Motors on a CAN bus that follow the newest command within their speed limits, every ``period``.
 
     interface, channel: as python-can names them (``socketcan``, ``can0``). codec: ``dbc`` or an object that follows
-    ``Codec``. compensation: add what the servos need against gravity. period: s, None = the database's cycle time.
+    ``Codec``. compensation: add what the servos need under their load. period: s, None = the database's cycle time.
     bitrate: bit/s, None = robot.yaml's. database: DBC file instead of the robot's own. zeros: how far this
     specimen's encoders are off. notice: told, a sentence each, what the operator should know beforehand.
     Raises DriverError where robot.yaml, database and bus load do not allow driving.

@@ -1,7 +1,8 @@
 """Constraints of the legs as linear rows ``C x >= b`` on a step x of the free variables.
 
 Each function writes its rows from ``row`` on and returns the next free one. The last columns of C belong to the slacks
-that soften the bounds of load, smoothness and sway: what cannot brake in time passes them as little as it must.
+that soften the bounds of load, smoothness, sway and descent: what cannot brake in time passes them as little as it
+must.
 """
 
 from __future__ import annotations

@@ -41,7 +41,8 @@ Array = npt.NDArray[np.float64]
 class Solution(NamedTuple):
     """What came of a solve.
 
-    iterations: 0 where the first step is infeasible. closure: error of the other sole in m and rad, summed. com_error:
+    iterations: 0 where the first step is infeasible. closure: how far the other sole is from where it must be, in m and
+    rad, summed. com_error:
     m. load: largest torque of a joint that holds the body up, as a share of its bound.
     """
 

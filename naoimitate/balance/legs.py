@@ -76,7 +76,7 @@ class LegWeights(NamedTuple):
     """Price of m of the torso's step beyond the bounds of sway, and..."""
     momentum: float = 3000.0
     """...of m^2 of momentum: so high that only a body that cannot brake in time pays."""
-    descent: float = 100.0
+    descent: float = 2.0
     """Price of m by which a foot that comes down stays higher than asked."""
     still: float = 0.3
     """Of the torso's own motion over the floor in a frame: it goes no faster than the feet's targets need."""

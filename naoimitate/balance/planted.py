@@ -31,17 +31,25 @@ Array = npt.NDArray[np.float64]
 SCALES = (1.0, 0.5, 0.2)
 """Parts of a step that are tried, in this order, before the pose is held."""
 CLOSED = 2e-5
-"""Sum of m and rad by which a planted sole may differ from where it stands after a solve."""
+"""Sum of m and rad by which a sole may differ from where it must be after a solve."""
 PLACE_STEPS = 150
 PLACE_STEP = 0.1
 """[rad] of each joint in one step of ``place``."""
 PLACE_TIME = 1.0
-"""[s] of one step of ``place``: nothing that a frame's time bounds is in its way."""
+"""[s] of one step of ``place``."""
+CARRIED = 0.001
+"""[m] by which a foot may carry the CoM along when it goes down."""
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
 LANDING_WEIGHT = 0.3
 """Of the stance foot's target while the other one lands: the torso gives way, as in the proof of the landing set."""
+
+
+def _unhurried(q: Array) -> Reach:
+    """A step from joint angles (J,) rad with which nothing that a frame's time bounds is in the way."""
+    low, high = q - PLACE_STEP, q + PLACE_STEP
+    return Reach(PLACE_TIME, low, high, low, high)
 
 
 class Planted:
@@ -80,7 +88,8 @@ class Planted:
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: the whole step, a part of it, or none, whatever passes the gate first."""
         stride = self._stride
-        plan = stride.plan(pose, footing, self._body, reach.dt)
+        within_reach = not stride.hovering or self._gets_down(pose, feet)
+        plan = stride.plan(pose, footing, self._body, reach.dt, within_reach)
         stances = (stride.mode.stance != "R", stride.mode.stance != "L")
         given_up = GivenUp.LANDING if plan.clipped else GivenUp(0)
         iterations = 0
@@ -144,6 +153,15 @@ class Planted:
                 return iterations, True, found.load
         return iterations, False, 0.0
 
+    def _gets_down(self, pose: Pose, feet: Array) -> bool:
+        """Whether the swing foot could stand on the floor below it and leave the CoM where it belongs."""
+        stride, other = self._stride, 1 - self._stride.side
+        place, flat = pose.sole_pos[other] * [1.0, 1.0, 0.0], yaw_matrix(heading(pose.sole_rot[other]))
+        q, offset = pose.q.copy(), stride.offset
+        _, closed, _ = self._solve(q, Plan(offset, 0.0, offset, place, flat, POSE), pose, feet, 1.0, _unhurried(q))
+        there = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
+        return closed and bool(np.hypot(*(there.com[:2] - stride.com_goal(offset))) < CARRIED)
+
     def _shares(self, offset: float, target: float) -> tuple[Array, Array]:
         """How much of the weight the left and the right leg carry, (2,), and how far it has gone by then, (2, 3) m.
 
@@ -187,10 +205,8 @@ class Planted:
         for k in range(PLACE_STEPS):
             part = min(1.0, 2.0 * (k + 1) / PLACE_STEPS)
             position, rotation = start[0] + part * (goal - start[0]), yaw_matrix(part * turn)
-            low, high = pose.q - PLACE_STEP, pose.q + PLACE_STEP
-            reach = Reach(PLACE_TIME, low, high, low, high)
-            q = pose.q.copy()
-            _, closed, _ = self._solve(q, Plan(offset, 0.0, offset, position, rotation, POSE), pose, feet, 1.0, reach)
+            q, plan = pose.q.copy(), Plan(offset, 0.0, offset, position, rotation, POSE)
+            _, closed, _ = self._solve(q, plan, pose, feet, 1.0, _unhurried(q))
             if closed:
                 stride.planted_pos[0], stride.planted_rot[0] = position, rotation
                 pose = self._maker.hang(q, 1, stride.planted_pos, stride.planted_rot)

@@ -24,6 +24,8 @@ Array = npt.NDArray[np.float64]
 
 COM_OFF = 0.004
 """[m] by which the CoM may be off its place while a foot comes down: a leg that pulls it along lands elsewhere."""
+LANDING = 0.0025
+"""[m] over the floor from which a foot lands without delay: one that hesitates there carries before its time."""
 TOUCHING = 2e-5
 """[m] above the place of its touchdown from which a sole counts as there."""
 LEAD = 0.001
@@ -95,8 +97,16 @@ class Stride:
         """Whether the body has been where it belongs for so long that nothing sways when a foot is lifted."""
         return self._weight.settled
 
-    def plan(self, pose: Pose, footing: Footing, body: Body, dt: float) -> Plan:
-        """Advance the support machine, the offset and the swing foot by dt s from the present pose."""
+    @property
+    def hovering(self) -> bool:
+        """Whether the swing foot waits over its landing place to go down."""
+        return self._swing is not None and self._swing.hovering
+
+    def plan(self, pose: Pose, footing: Footing, body: Body, dt: float, within_reach: bool = True) -> Plan:
+        """Advance the support machine, the offset and the swing foot by dt s from the present pose.
+
+        within_reach: whether a foot that hovers gets down to the floor.
+        """
         before = self.mode
         given = SupportInput(
             human=footing.support,
@@ -120,7 +130,7 @@ class Stride:
             lifting = self._weight.there and (given.ahead or wanted_stance(self.mode, given) != "D")
             sway = QUIET if lifting else self._sway_on_both()
             return Plan(offset, speed, target, self.planted_pos[other], self.planted_rot[other], POSE, sway)
-        return self._swing_plan(self._swing, pose, footing, (offset, speed, target), error, dt)
+        return self._swing_plan(self._swing, pose, footing, (offset, speed, target), error, dt, within_reach)
 
     def _span(self, left: Array, right: Array, height: float) -> Span:
         """What the weight is shifted on, soles as they stand."""
@@ -146,19 +156,27 @@ class Stride:
         return Ground(along, room_around(polygon, *pose.com[:2], along, ZMP_MARGIN, ZMP_LEAST))
 
     def _swing_plan(
-        self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float, float], error: float, dt: float
+        self,
+        swing: Swing,
+        pose: Pose,
+        footing: Footing,
+        offset: tuple[float, float, float],
+        error: float,
+        dt: float,
+        within_reach: bool,
     ) -> Plan:
         foot = 1 - self.side
         stance_yaw = heading(self.planted_rot[self.side])
         place, turn, clipped = self.landing.clip(foot, *self._landing_wish(swing, footing))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
-        if swing.phase is Phase.DESCEND and error > COM_OFF:
+        landing = swing.phase is Phase.DESCEND and pose.sole_pos[foot][2] < LANDING
+        if swing.phase is Phase.DESCEND and error > COM_OFF and not landing:
             swing.go_up()
         position, rotation, down = swing.step(
-            pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
+            pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt, within_reach
         )
         moving = swing.phase in (Phase.FREE, Phase.APPROACH) and not swing.hovering
-        kind, sway = _KINDS[swing.phase], ONE_FOOT if moving else QUIET
+        kind, sway = POSE if landing else _KINDS[swing.phase], ONE_FOOT if moving else QUIET
         return Plan(*offset, position, rotation, kind, sway, swing.min_height, down, clipped and self.mode.landing)
 
     def _sway_on_both(self) -> SwayLimits:

@@ -18,6 +18,10 @@ OVERHEAD = 0.001
 """[m] by which a foot may be lower than its way to the landing place asks, so that bound and way never fight."""
 
 
+SINKING = 0.4
+"""Share of the way down that it was asked for with which a foot still comes down: half a step does."""
+
+
 class Phase(enum.Enum):
     """Parts of a swing."""
 
@@ -63,14 +67,14 @@ class SwingSettings:
     """[s] of approach after which a foot that does not arrive may come down near its place."""
     yielding: float = 0.015
     """[m] by which the distance that is near enough grows while it gives way."""
-    hover: float = 0.12
+    hover: float = 0.2
     """[s] over the landing place before the foot goes down: what sways comes to rest."""
     hover_height: float = 0.007
     """[m] over the floor: a leg that is stretched there has brought the body down with it, and not while it lands."""
     close: float = 0.02
     """[m] from the landing place, over the floor, within which the foot comes down to hover."""
     blocked: float = 0.2
-    """[s] of refused steps after which a foot that comes down goes up again."""
+    """[s] of steps refused, or of next to no way, after which a foot that comes down goes up again."""
     settled: float = 0.02
     """[m/s] below which a foot over its landing place goes down."""
     arrived: float = 0.001
@@ -95,11 +99,19 @@ class Swing:
         self._rotation = rotation.copy()
 
     def step(
-        self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float
+        self,
+        position: Array,
+        rotation: Array,
+        goal: Array,
+        goal_yaw: float,
+        landing: bool,
+        dt: float,
+        within_reach: bool = True,
     ) -> tuple[Array, Array, bool]:
         """The sole pose to ask for next.
 
         position, rotation: the sole as it is. goal (2,) m, goal_yaw rad: where it is to land, used once ``landing``.
+        within_reach: whether the leg gets down to the floor from where the sole hovers.
         Returns position (3,), rotation (3, 3), and whether it has touched down.
         """
         moved, self._before = position - self._before, position.copy()
@@ -117,11 +129,11 @@ class Swing:
             if self._blocked < self.settings.blocked:
                 return self._descend(position, rotation, dt)
             self._blocked, self._hovered, self.min_height = 0.0, 0.0, min(self.min_height, float(position[2]))
-        return self._approach(position, rotation, moved, goal, goal_yaw, dt)
+        return self._approach(position, rotation, moved, goal, goal_yaw, dt, within_reach)
 
     def _sink(self, way: float, dt: float) -> None:
         """The foot came down by ``way`` m in the last dt s; where its leg is in the way, by less than was asked."""
-        if way < 0.5 * self._asked:
+        if way < SINKING * self._asked - 1e-6:
             self._velocity[2], self._refused = -max(way, 0.0) / dt, True
 
     def stop(self) -> None:
@@ -154,7 +166,14 @@ class Swing:
         return np.array([self._start[0], self._start[1], height]), self._rotation, False
 
     def _approach(
-        self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float
+        self,
+        position: Array,
+        rotation: Array,
+        moved: Array,
+        goal: Array,
+        goal_yaw: float,
+        dt: float,
+        within_reach: bool,
     ) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
         close = math.hypot(goal[0] - position[0], goal[1] - position[1]) < self.settings.close
@@ -169,7 +188,7 @@ class Swing:
         settled = np.linalg.norm(moved) < self.settings.settled * dt or self._waited > self.settings.patience
         arrived = np.linalg.norm(way) < near and 0.1 * angle < near and settled
         self._hovered = self._hovered + dt if arrived else 0.0
-        if self._hovered > self.settings.hover:
+        if self._hovered > self.settings.hover and within_reach:
             self.phase = Phase.DESCEND
             self._start = position.copy()
             self._velocity[:] = 0.0

@@ -23,7 +23,7 @@ HURRY = 0.45
 """Share of its speed that a leg's joint may use before the weight is shifted more slowly."""
 LOADED, TOO_LOADED = 1.0, 1.3
 """Shares of the bound of a joint's torque between which the weight is shifted on to it more and more slowly..."""
-STOP = 0.2
+STOP = 0.1
 """[s] in which the body can stop: a joint of a leg whose range ends sooner slows the shift, too..."""
 SLOWEST = 0.2
 """...down to this share of the speed: the legs straighten meanwhile."""
@@ -35,7 +35,7 @@ class Body(NamedTuple):
     calm: it moves little enough for a foot to be lifted. steady: its zero moment point is where its CoM is. speed:
     share of its speed that the fastest joint of the legs uses. load: share of its bound that their largest torque has,
     or will have when the weight has been shifted. end: s until the first joint of the legs, each at its speed, is at
-    the end of its range.
+    the end of its range or of its coupling table.
     """
 
     calm: bool = True

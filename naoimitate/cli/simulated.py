@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-import numpy as np
 
 if TYPE_CHECKING:
     from naoimitate.core.frames import Motion
@@ -23,10 +22,10 @@ def simulated(run: Run, robot: RobotModel, stiffness: float | None = None, close
     from naoimitate.cli.progress import progress
     from naoimitate.hw.feedback import feedback
     from naoimitate.sim.settings import SimSettings
-    from naoimitate.sim.simulate import simulate
+    from naoimitate.sim.simulate import period_of, simulate
 
-    nominal, period = SimSettings.stiffness, float(np.median(np.diff(run.time))) if len(run) > 1 else SimSettings.period
-    control = feedback(robot, nominal, period, learning=closed, balance=closed)
+    nominal = SimSettings.stiffness
+    control = feedback(robot, nominal, period_of(run.time), learning=closed, balance=closed)
     with progress("simulating") as advance:
         result = simulate(
             robot,
