@@ -42,8 +42,7 @@ class Solution(NamedTuple):
     """What came of a solve.
 
     iterations: 0 where the first step is infeasible. closure: how far the other sole is from where it must be, in m and
-    rad, summed. com_error:
-    m. load: largest torque of a joint that holds the body up, as a share of its bound.
+    rad, summed. com_error: m. load: largest torque of a joint that holds the body up, as a share of its bound.
     """
 
     iterations: int
