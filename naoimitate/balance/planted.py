@@ -37,8 +37,6 @@ PLACE_STEP = 0.1
 """[rad] of each joint in one step of ``place``."""
 PLACE_TIME = 1.0
 """[s] of one step of ``place``."""
-CARRIED = 0.001
-"""[m] by which a foot may carry the CoM along when it goes down."""
 LEVEL_BELOW = 0.05
 """[m] of height below which a swinging sole is levelled more and more."""
 LEVEL_GAIN = 4.0
@@ -88,8 +86,7 @@ class Planted:
     def step(self, pose: Pose, q_arms: Array, feet: Array, footing: Footing, reach: Reach) -> Answer:
         """The next pose: the whole step, a part of it, or none, whatever passes the gate first."""
         stride = self._stride
-        within_reach = not stride.hovering or self._gets_down(pose, feet)
-        plan = stride.plan(pose, footing, self._body, reach.dt, within_reach)
+        plan = stride.plan(pose, footing, self._body, reach.dt)
         stances = (stride.mode.stance != "R", stride.mode.stance != "L")
         given_up = GivenUp.LANDING if plan.clipped else GivenUp(0)
         iterations = 0
@@ -152,15 +149,6 @@ class Planted:
             if found.iterations > 0 and found.closure < CLOSED:
                 return iterations, True, found.load
         return iterations, False, 0.0
-
-    def _gets_down(self, pose: Pose, feet: Array) -> bool:
-        """Whether the swing foot could stand on the floor below it and leave the CoM where it belongs."""
-        stride, other = self._stride, 1 - self._stride.side
-        place, flat = pose.sole_pos[other] * [1.0, 1.0, 0.0], yaw_matrix(heading(pose.sole_rot[other]))
-        q, offset = pose.q.copy(), stride.offset
-        _, closed, _ = self._solve(q, Plan(offset, 0.0, offset, place, flat, POSE), pose, feet, 1.0, _unhurried(q))
-        there = self._maker.hang(q, stride.side, stride.planted_pos, stride.planted_rot)
-        return closed and bool(np.hypot(*(there.com[:2] - stride.com_goal(offset))) < CARRIED)
 
     def _shares(self, offset: float, target: float) -> tuple[Array, Array]:
         """How much of the weight the left and the right leg carry, (2,), and how far it has gone by then, (2, 3) m.

@@ -97,16 +97,8 @@ class Stride:
         """Whether the body has been where it belongs for so long that nothing sways when a foot is lifted."""
         return self._weight.settled
 
-    @property
-    def hovering(self) -> bool:
-        """Whether the swing foot waits over its landing place to go down."""
-        return self._swing is not None and self._swing.hovering
-
-    def plan(self, pose: Pose, footing: Footing, body: Body, dt: float, within_reach: bool = True) -> Plan:
-        """Advance the support machine, the offset and the swing foot by dt s from the present pose.
-
-        within_reach: whether a foot that hovers gets down to the floor.
-        """
+    def plan(self, pose: Pose, footing: Footing, body: Body, dt: float) -> Plan:
+        """Advance the support machine, the offset and the swing foot by dt s from the present pose."""
         before = self.mode
         given = SupportInput(
             human=footing.support,
@@ -130,7 +122,7 @@ class Stride:
             lifting = self._weight.there and (given.ahead or wanted_stance(self.mode, given) != "D")
             sway = QUIET if lifting else self._sway_on_both()
             return Plan(offset, speed, target, self.planted_pos[other], self.planted_rot[other], POSE, sway)
-        return self._swing_plan(self._swing, pose, footing, (offset, speed, target), error, dt, within_reach)
+        return self._swing_plan(self._swing, pose, footing, (offset, speed, target), error, dt)
 
     def _span(self, left: Array, right: Array, height: float) -> Span:
         """What the weight is shifted on, soles as they stand."""
@@ -156,14 +148,7 @@ class Stride:
         return Ground(along, room_around(polygon, *pose.com[:2], along, ZMP_MARGIN, ZMP_LEAST))
 
     def _swing_plan(
-        self,
-        swing: Swing,
-        pose: Pose,
-        footing: Footing,
-        offset: tuple[float, float, float],
-        error: float,
-        dt: float,
-        within_reach: bool,
+        self, swing: Swing, pose: Pose, footing: Footing, offset: tuple[float, float, float], error: float, dt: float
     ) -> Plan:
         foot = 1 - self.side
         stance_yaw = heading(self.planted_rot[self.side])
@@ -173,7 +158,7 @@ class Stride:
         if swing.phase is Phase.DESCEND and error > COM_OFF and not landing:
             swing.go_up()
         position, rotation, down = swing.step(
-            pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt, within_reach
+            pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
         moving = swing.phase in (Phase.FREE, Phase.APPROACH) and not swing.hovering
         kind, sway = POSE if landing else _KINDS[swing.phase], ONE_FOOT if moving else QUIET

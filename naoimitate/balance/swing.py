@@ -99,19 +99,11 @@ class Swing:
         self._rotation = rotation.copy()
 
     def step(
-        self,
-        position: Array,
-        rotation: Array,
-        goal: Array,
-        goal_yaw: float,
-        landing: bool,
-        dt: float,
-        within_reach: bool = True,
+        self, position: Array, rotation: Array, goal: Array, goal_yaw: float, landing: bool, dt: float
     ) -> tuple[Array, Array, bool]:
         """The sole pose to ask for next.
 
         position, rotation: the sole as it is. goal (2,) m, goal_yaw rad: where it is to land, used once ``landing``.
-        within_reach: whether the leg gets down to the floor from where the sole hovers.
         Returns position (3,), rotation (3, 3), and whether it has touched down.
         """
         moved, self._before = position - self._before, position.copy()
@@ -129,7 +121,7 @@ class Swing:
             if self._blocked < self.settings.blocked:
                 return self._descend(position, rotation, dt)
             self._blocked, self._hovered, self.min_height = 0.0, 0.0, min(self.min_height, float(position[2]))
-        return self._approach(position, rotation, moved, goal, goal_yaw, dt, within_reach)
+        return self._approach(position, rotation, moved, goal, goal_yaw, dt)
 
     def _sink(self, way: float, dt: float) -> None:
         """The foot came down by ``way`` m in the last dt s; where its leg is in the way, by less than was asked."""
@@ -166,14 +158,7 @@ class Swing:
         return np.array([self._start[0], self._start[1], height]), self._rotation, False
 
     def _approach(
-        self,
-        position: Array,
-        rotation: Array,
-        moved: Array,
-        goal: Array,
-        goal_yaw: float,
-        dt: float,
-        within_reach: bool,
+        self, position: Array, rotation: Array, moved: Array, goal: Array, goal_yaw: float, dt: float
     ) -> tuple[Array, Array, bool]:
         self.phase = Phase.APPROACH
         close = math.hypot(goal[0] - position[0], goal[1] - position[1]) < self.settings.close
@@ -188,7 +173,7 @@ class Swing:
         settled = np.linalg.norm(moved) < self.settings.settled * dt or self._waited > self.settings.patience
         arrived = np.linalg.norm(way) < near and 0.1 * angle < near and settled
         self._hovered = self._hovered + dt if arrived else 0.0
-        if self._hovered > self.settings.hover and within_reach:
+        if self._hovered > self.settings.hover:
             self.phase = Phase.DESCEND
             self._start = position.copy()
             self._velocity[:] = 0.0
