@@ -40,5 +40,5 @@ def room_around(polygon: Array, x: float, y: float, along: Array, margin: float,
     dx, dy = along
     room = np.empty(4)
     for k, (ux, uy) in enumerate(((dx, dy), (-dx, -dy), (-dy, dx), (dy, -dx))):
-        room[k] = max(distance_to_edge(polygon, x, y, ux, uy) - margin, least)
+        room[k] = max(distance_to_edge(polygon, x, y, ux, uy, margin), least)
     return room

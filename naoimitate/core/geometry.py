@@ -141,8 +141,11 @@ def polygon_margin(polygon: Array, x: float, y: float) -> float:
 
 
 @njit(cache=True)
-def distance_to_edge(polygon: Array, x: float, y: float, dx: float, dy: float) -> float:
-    """How far (m) a point inside a convex counter-clockwise polygon (N, 2) is from its edge along a unit direction."""
+def distance_to_edge(polygon: Array, x: float, y: float, dx: float, dy: float, margin: float = 0.0) -> float:
+    """How far (m) a point in a convex counter-clockwise polygon (N, 2) may go along a unit direction.
+
+    margin: m that it keeps from every edge; negative where it is nearer to one already.
+    """
     nearest = np.inf
     n = polygon.shape[0]
     for i in range(n):
@@ -151,7 +154,8 @@ def distance_to_edge(polygon: Array, x: float, y: float, dx: float, dy: float) -
         nx, ny = by - ay, ax - bx
         along = nx * dx + ny * dy
         if along > 0.0:
-            nearest = min(nearest, (nx * (ax - x) + ny * (ay - y)) / along)
+            inside = nx * (ax - x) + ny * (ay - y) - margin * np.hypot(nx, ny)
+            nearest = min(nearest, inside / along)
     return nearest
 
 
