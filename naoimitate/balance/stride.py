@@ -24,7 +24,7 @@ Array = npt.NDArray[np.float64]
 
 COM_OFF = 0.004
 """[m] by which the CoM may be off its place while a foot comes down: a leg that pulls it along lands elsewhere."""
-LANDING = 0.0025
+LANDING = 0.0032
 """[m] over the floor from which a foot lands without delay: one that hesitates there carries before its time."""
 TOUCHING = 2e-5
 """[m] above the place of its touchdown from which a sole counts as there."""
