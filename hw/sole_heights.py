@@ -22,7 +22,7 @@ class HeightSettings:
 
     most: float = 0.008
     """[m] by which a sole may be raised or lowered."""
-    raising: float = 0.04
+    raising: float = 0.08
     """[m/s] at which a sole is raised that carries and should not."""
     lowering: float = 0.01
     """[m/s] at which a sole is lowered that should carry and does not, and at which a raised one comes back."""

@@ -83,10 +83,9 @@ def test_a_floor_that_rises_under_a_foot_lifts_it_and_takes_its_weight() -> None
 
 def test_a_foot_that_lands_early_takes_less_weight_and_tips_the_body_less_with_closed_loops(landing: Landing) -> None:
     free, closed = (landing.on(HIGH, loops) for loops in (False, True))
-    assert free.swing_load.max() > 0.9, "the foot has come down early, and the body topples over to it"
+    assert free.swing_load.max() > 0.8, "the foot has come down early, and the body topples over to it"
     assert closed.swing_load.max() < 0.8 * free.swing_load.max()
-    assert worst_tilt(closed) < worst_tilt(free) - 0.5
-    assert closed.cop_margin.min() > free.cop_margin.min() + 0.01
+    assert worst_tilt(closed) < worst_tilt(free) - 1.0
 
 
 def test_a_foot_that_lands_late_comes_down_sooner_and_tips_the_body_less_with_closed_loops(landing: Landing) -> None:
@@ -97,6 +96,6 @@ def test_a_foot_that_lands_late_comes_down_sooner_and_tips_the_body_less_with_cl
     assert worst_tilt(closed) < worst_tilt(free) - 0.2
 
 
-@pytest.mark.xfail(strict=True, reason="raised at 40 mm/s, a sole still takes half of the weight before its time")
+@pytest.mark.xfail(strict=True, reason="raised at 80 mm/s, a sole still takes half of the weight before its time")
 def test_a_foot_that_lands_early_carries_less_than_a_tenth_before_its_time(landing: Landing) -> None:
     assert landing.on(HIGH, closed=True).survived
