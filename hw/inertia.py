@@ -35,7 +35,7 @@ class Inertia:
     """
 
     def __init__(self, robot: RobotModel, inner: ServoCommand, period: float) -> None:
-        self._tree, self._inner, self._period = robot.tree, inner, period
+        self._tree, self.inner, self._period = robot.tree, inner, period
         joints = len(robot.joint_names)
         self._pos, self._rot = np.zeros((joints + 1, 3)), np.zeros((joints + 1, 3, 3))
         self._share = robot.tree.mass / robot.tree.mass.sum()
@@ -53,7 +53,7 @@ class Inertia:
                 self._begin()
         else:
             self._see(target, torso)
-        return self._inner(target._replace(acceleration=self._acceleration @ torso), state)
+        return self.inner(target._replace(acceleration=self._acceleration @ torso), state)
 
     def _see(self, target: Target, torso: Array) -> None:
         """Take up a new posture of the plan."""

@@ -198,7 +198,7 @@ def test_a_guessed_stiffness_can_be_corrected_by_what_the_robot_feels(
         fake.feels(f"RFoot/FSR/{place}", 0.65)
     driver = connect(servo_stiffness=200.0, learning=True)
     driver.write(command(STAND))
-    wait_for(lambda: driver._command.factor < 0.8)  # type: ignore[attr-defined]
+    wait_for(lambda: driver._command.inner.factor < 0.8)  # type: ignore[attr-defined]
 
 
 def test_closed_loops_balance_what_it_feels_and_let_go_when_it_feels_nothing_new(

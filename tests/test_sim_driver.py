@@ -21,12 +21,12 @@ from naoimitate.sim.settings import SimSettings
 def command(robot: RobotModel, q: Array, support: str = "D", *, moved: Array | None = None) -> RobotCommand:
     """A command to stand as q; moved: joints (J,) rad in place of q, which the torso's plan does not know of.
 
-    A driver looks at joints, torso and support only: the rest is left empty.
+    A driver looks at joints, torso, support and time only: the rest is left empty.
     """
     base_pos, base_quat = stand_on_floor(robot, q, None if support == "D" else support.lower())
     empty: dict[str, Any] = {field.name: None for field in fields(RobotCommand)}
     body = {"q": q if moved is None else moved, "base_pos": base_pos, "base_quat": base_quat, "support": support}
-    return RobotCommand(**{**empty, **body})
+    return RobotCommand(**{**empty, **body, "time": 0.0})
 
 
 def raised_arms(robot: RobotModel) -> Array:
