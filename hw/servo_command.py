@@ -14,7 +14,7 @@ from naoimitate.robot.model import RobotModel
 
 
 def servo_command(robot: RobotModel, stiffness: Array | float | None, period: float) -> ServoCommand:
-    """Compensation for servos of a stiffness, (J,) or one for all, N m/rad; None: the posture as it is.
+    """Load compensation for servos of a stiffness, (J,) or one for all, N m/rad; None: the posture as it is.
 
     period: s between two calls.
     """

@@ -19,13 +19,13 @@ Ints = npt.NDArray[np.int64]
 
 
 POSE = 0
-"""The other sole follows a given pose exactly: planted, lifting."""
+"""The other sole follows a given pose exactly: planted, lifting, landing."""
 FREE = 1
 """The other sole swings: its place in the torso frame and its level are tasks, its height a bound."""
 REACH = 2
 """The other sole makes for a pose in the world, around whatever is in its way; its height is a bound."""
 DOWN = 3
-"""The other sole comes down: it follows a given pose exactly, but stays higher where the body would have to jump."""
+"""The other sole comes down: it follows a given pose exactly, but stays higher where the body cannot follow."""
 
 
 class Legs(NamedTuple):

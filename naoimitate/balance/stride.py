@@ -154,14 +154,14 @@ class Stride:
         stance_yaw = heading(self.planted_rot[self.side])
         place, turn, clipped = self.landing.clip(foot, *self._landing_wish(swing, footing))
         goal = self.planted_pos[self.side][:2] + yaw_matrix(stance_yaw)[:2, :2] @ place
-        landing = swing.phase is Phase.DESCEND and pose.sole_pos[foot][2] < LANDING
-        if swing.phase is Phase.DESCEND and error > COM_OFF and not landing:
+        low = swing.phase is Phase.DESCEND and pose.sole_pos[foot][2] < LANDING
+        if swing.phase is Phase.DESCEND and error > COM_OFF and not low:
             swing.go_up()
         position, rotation, down = swing.step(
             pose.sole_pos[foot], pose.sole_rot[foot], goal, stance_yaw + turn, self.mode.landing, dt
         )
         moving = swing.phase in (Phase.FREE, Phase.APPROACH) and not swing.hovering
-        kind, sway = POSE if landing else _KINDS[swing.phase], ONE_FOOT if moving else QUIET
+        kind, sway = POSE if low else _KINDS[swing.phase], ONE_FOOT if moving else QUIET
         return Plan(*offset, position, rotation, kind, sway, swing.min_height, down, clipped and self.mode.landing)
 
     def _sway_on_both(self) -> SwayLimits:
